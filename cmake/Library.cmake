@@ -4,8 +4,8 @@
 # under their own paths.
 
 set(public_headers volumes/files/tensor_files.h volumes/tensors/eigenvalues.h volumes/making/generators.h
-    volumes/tensors/invariants.h volumes/bricks/tensor_field.h renderer/meshes/mesh.h integrators/tracing/trace.h
-    integrators/paths/paths.h integrators/flow/flow_map.h scenes/pipeline/read_scene.h scenes/scene/scene.h
+    volumes/tensors/invariants.h volumes/bricks/tensor_field.h renderer/meshes/mesh.h tracing/trace/trace.h
+    tracing/paths/paths.h tracing/flow/flow_map.h integrators/methods/read_scene.h scenes/scene/scene.h
     scenes/scene/render.h scenes/outputs/write_outputs.h)
 
 # The headers of this project that `headers` include, and themselves.
@@ -27,9 +27,9 @@ endfunction()
 
 # Not linked by the project's own programs, which start faster without it.
 add_library(libtensorray SHARED ${PROJECT_SOURCE_DIR}/cmake/package/library.cpp)
-target_link_libraries(libtensorray PRIVATE scenes tensorray_options)
+target_link_libraries(libtensorray PRIVATE integrators tensorray_options)
 set_target_properties(libtensorray PROPERTIES
-                      LINK_LIBRARY_OVERRIDE "WHOLE_ARCHIVE,base,renderer,volumes,integrators,scenes")
+                      LINK_LIBRARY_OVERRIDE "WHOLE_ARCHIVE,base,renderer,volumes,tracing,scenes,integrators")
 target_link_options(libtensorray PRIVATE -Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/package/symbols.map)
 add_dependencies(libtensorray tensorray_pictures)
 set_target_properties(libtensorray PROPERTIES OUTPUT_NAME tensorray EXPORT_NAME tensorray VERSION ${PROJECT_VERSION}

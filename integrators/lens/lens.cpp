@@ -11,10 +11,10 @@
 
 #include "base/process/job.h"
 #include "base/process/seconds.h"
-#include "integrators/flow_drawing/flow_view.h"
 #include "integrators/lens/lens_places.h"
 #include "integrators/lens/lens_shading.h"
 #include "integrators/lens/lens_view.h"
+#include "tracing/flow_drawing/flow_view.h"
 
 namespace tensorray {
 namespace {

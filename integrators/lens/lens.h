@@ -6,7 +6,7 @@
 /// Both rectangles are given as the viewer sees them: their normals point to the viewer, along the light. This medium
 /// has no n² radiance law: the radiance of the image arrives unchanged.
 ///
-/// Both modes are a flow map (integrators/flow/flow_map.h) of a LensMap, which all bands share: `scatter` draws its
+/// Both modes are a flow map (tracing/flow/flow_map.h) of a LensMap, which all bands share: `scatter` draws its
 /// mesh over the landings, `gather` traces from the receiver and draws its mesh over the starts.
 
 #include <cstddef>
@@ -16,11 +16,11 @@
 #include <Eigen/Geometry>
 
 #include "base/process/progress.h"
-#include "integrators/bending/light_channel.h"
-#include "integrators/flow/flow_map.h"
 #include "integrators/lens/lens_map.h"
 #include "renderer/film/film.h"
 #include "renderer/textures/texture.h"
+#include "tracing/bending/light_channel.h"
+#include "tracing/flow/flow_map.h"
 
 namespace tensorray {
 

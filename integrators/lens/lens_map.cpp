@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "integrators/tracing/trace.h"
+#include "tracing/trace/trace.h"
 
 namespace tensorray {
 namespace {

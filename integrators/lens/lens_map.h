@@ -8,8 +8,8 @@
 
 #include <Eigen/Core>
 
-#include "integrators/bending/bending.h"
-#include "integrators/bending/geometry.h"
+#include "tracing/bending/bending.h"
+#include "tracing/bending/geometry.h"
 
 namespace tensorray {
 

@@ -7,8 +7,8 @@
 
 #include <Eigen/Geometry>
 
-#include "integrators/flow_drawing/flow_view.h"
 #include "integrators/lens/lens.h"
+#include "tracing/flow_drawing/flow_view.h"
 
 namespace tensorray {
 

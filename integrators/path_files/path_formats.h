@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "integrators/paths/paths.h"
+#include "tracing/paths/paths.h"
 
 namespace tensorray {
 

@@ -9,7 +9,7 @@
 
 #include "integrators/path_files/path_files.h"
 #include "integrators/path_files/path_formats.h"
-#include "integrators/paths/cross_section.h"
+#include "tracing/paths/cross_section.h"
 #include "volumes/points/vtk_files.h"
 
 namespace tensorray {

@@ -12,11 +12,11 @@
 
 #include "base/errors.h"
 #include "base/files/output_file.h"
+#include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
 #include "python/module/choices.h"
 #include "python/module/field.h"
 #include "python/module/work.h"
-#include "scenes/pipeline/read_scene.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/invariants.h"
 

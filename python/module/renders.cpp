@@ -12,6 +12,7 @@
 #include "base/process/process_limits.h"
 #include "base/process/seconds.h"
 #include "base/text/text.h"
+#include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
@@ -20,7 +21,6 @@
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/outputs/statistics_json.h"
 #include "scenes/outputs/write_outputs.h"
-#include "scenes/pipeline/read_scene.h"
 #include "scenes/scene/render.h"
 
 namespace tensorray {

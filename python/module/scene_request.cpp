@@ -7,7 +7,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "base/text/text.h"
-#include "scenes/pipeline/read_scene.h"
+#include "integrators/methods/read_scene.h"
 #include "scenes/source/overrides.h"
 
 namespace tensorray {

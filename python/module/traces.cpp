@@ -15,8 +15,6 @@
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
-#include "integrators/flow/flow_map.h"
-#include "integrators/tracing/trace.h"
 #include "python/module/arrays.h"
 #include "python/module/choices.h"
 #include "python/module/field.h"
@@ -24,6 +22,8 @@
 #include "python/module/work.h"
 #include "renderer/meshes/mesh.h"
 #include "scenes/scene/fine_bands.h"
+#include "tracing/flow/flow_map.h"
+#include "tracing/trace/trace.h"
 #include "volumes/making/smoothing.h"
 
 namespace tensorray {

@@ -8,7 +8,6 @@
 #include <Eigen/Eigenvalues>
 #include <tbb/parallel_for.h>
 
-
 namespace tensorray {
 namespace {
 

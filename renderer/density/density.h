@@ -58,8 +58,8 @@ class DensityEstimator {
   ///              not finite count as 0.
   void add(int channel, const Eigen::Vector2d& at, const Eigen::Matrix2d& axes = Eigen::Matrix2d::Zero());
 
-  /// Writes the sums so far, or adds those of other photons; not while photons are added. @throw DamagedArchive if there
-  /// are not so many.
+  /// Writes the sums so far, or adds those of other photons; not while photons are added. @throw DamagedArchive if
+  /// there are not so many.
   void copy_sums(Archive& archive);
 
   /// Returns weight per pixel. @param weight  The weight of one photon. Runs on all threads; the result does not depend

@@ -4,12 +4,12 @@
 
 #include <array>
 
-#include "integrators/bending/bending.h"
 #include "renderer/camera/camera.h"
 #include "renderer/charts/colormap.h"
 #include "renderer/lights/beam.h"
 #include "scenes/description/description.h"
 #include "scenes/keys/choice.h"
+#include "tracing/bending/bending.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/eigenvalues.h"
 #include "volumes/tensors/invariants.h"

@@ -16,8 +16,6 @@
 
 #include <Eigen/Core>
 
-#include "integrators/bending/bending.h"
-#include "integrators/bending/flexibility.h"
 #include "renderer/camera/camera.h"
 #include "renderer/lights/beam.h"
 #include "renderer/textures/test_images.h"
@@ -25,6 +23,8 @@
 #include "scenes/description/method.h"
 #include "scenes/description/spectrum_description.h"
 #include "scenes/keys/generate_grid.h"
+#include "tracing/bending/bending.h"
+#include "tracing/bending/flexibility.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/eigenvalues.h"
 

@@ -13,12 +13,12 @@
 #include <Eigen/Core>
 
 #include "base/process/job.h"
-#include "integrators/bending/light_channel.h"
-#include "integrators/paths/paths.h"
 #include "renderer/film/plate_photon.h"
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
 #include "renderer/light_maps/photon_counts.h"
+#include "tracing/bending/light_channel.h"
+#include "tracing/paths/paths.h"
 #include "volumes/grids/scalar_grid.h"
 
 namespace tensorray {

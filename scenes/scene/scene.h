@@ -8,14 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "integrators/bending/bending.h"
-#include "integrators/bending/geometry.h"
-#include "integrators/bending/light_channel.h"
-#include "integrators/probes/auto_scale.h"
 #include "renderer/color/color.h"
 #include "renderer/lights/beam.h"
 #include "renderer/spectra/spectrum.h"
 #include "scenes/description/description.h"
+#include "tracing/bending/bending.h"
+#include "tracing/bending/geometry.h"
+#include "tracing/bending/light_channel.h"
+#include "tracing/scale/auto_scale.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/tensors/eigenvalues.h"
 

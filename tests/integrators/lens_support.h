@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "integrators/lens/lens.h"
-#include "tests/integrators/support.h"
+#include "tests/tracing/support.h"
 
 namespace tensorray::test {
 

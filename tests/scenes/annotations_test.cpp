@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 
 #include "base/process/progress.h"
+#include "integrators/methods/read_scene.h"
 #include "scenes/outputs/picture_outputs.h"
-#include "scenes/pipeline/read_scene.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 

@@ -7,8 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "integrators/methods/methods.h"
 #include "scenes/outputs/channel_table.h"
-#include "scenes/pipeline/methods.h"
 #include "tests/data_folder.h"
 
 namespace tensorray {

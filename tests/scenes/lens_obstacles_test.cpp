@@ -1,6 +1,6 @@
 // Tests how the picture of a lens shows obstacles.
 
-#include "scenes/lens/lens_obstacles.h"
+#include "integrators/lens/lens_obstacles.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "scenes/path_tracing/path_colors.h"
+#include "integrators/path_tracing/path_colors.h"
 
 #include <vector>
 

@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "scenes/pipeline/read_scene.h"
+#include "integrators/methods/read_scene.h"
 
 namespace tensorray::test {
 

@@ -1,4 +1,4 @@
-#include "scenes/pipeline/read_scene.h"
+#include "integrators/methods/read_scene.h"
 
 #include <filesystem>
 #include <string>
@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
 
-#include "scenes/lens/lens_description.h"
-#include "scenes/path_tracing/path_tracing_description.h"
-#include "scenes/photons/photon_distribution_method.h"
+#include "integrators/lens/lens_description.h"
+#include "integrators/path_tracing/path_tracing_description.h"
+#include "integrators/photon_distribution/photon_distribution_method.h"
 #include "tests/scenes/read_scene_fixture.h"
 
 namespace tensorray {

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "scenes/pipeline/read_scene.h"
+#include "integrators/methods/read_scene.h"
 
 namespace tensorray {
 namespace {

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "base/process/progress.h"
-#include "scenes/pipeline/read_scene.h"
+#include "integrators/methods/read_scene.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "volumes/making/generators.h"

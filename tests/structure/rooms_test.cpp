@@ -60,48 +60,34 @@ const std::vector<Room> rooms{
     {"volumes/points", {"volumes/vdb"}},
     {"volumes/files", {"volumes/grids", "volumes/tensors", "volumes/vdb"}},
 
-    {"integrators/bending", {"renderer/*", "volumes/*"}},
-    {"integrators/steps", {"integrators/bending", "renderer/*", "volumes/*"}},
-    {"integrators/kernels", {"integrators/bending", "integrators/steps", "renderer/*", "volumes/*"}},
-    {"integrators/tracing",
-     {"integrators/bending", "integrators/kernels", "integrators/steps", "renderer/*", "volumes/*"}},
-    {"integrators/flow", {"integrators/bending", "integrators/tracing", "renderer/*", "volumes/*"}},
-    {"integrators/flow_drawing",
-     {"integrators/bending", "integrators/flow", "integrators/tracing", "renderer/*", "volumes/*"}},
-    {"integrators/lens",
-     {"integrators/bending", "integrators/flow", "integrators/flow_drawing", "integrators/tracing", "renderer/*",
-      "volumes/*"}},
-    {"integrators/paths",
-     {"integrators/bending", "integrators/steps", "integrators/tracing", "renderer/*", "volumes/*"}},
-    {"integrators/path_files", {"integrators/paths", "renderer/*", "volumes/*"}},
+    {"tracing/bending", {"renderer/*", "volumes/*"}},
+    {"tracing/steps", {"tracing/bending", "renderer/*", "volumes/*"}},
+    {"tracing/kernels", {"tracing/bending", "tracing/steps", "renderer/*", "volumes/*"}},
+    {"tracing/trace", {"tracing/bending", "tracing/kernels", "tracing/steps", "renderer/*", "volumes/*"}},
+    {"tracing/scale", {"tracing/bending", "tracing/trace", "renderer/*", "volumes/*"}},
+    {"tracing/flow", {"tracing/bending", "tracing/trace", "renderer/*", "volumes/*"}},
+    {"tracing/flow_drawing", {"tracing/bending", "tracing/flow", "tracing/trace", "renderer/*", "volumes/*"}},
+    {"tracing/paths", {"tracing/bending", "tracing/steps", "tracing/trace", "renderer/*", "volumes/*"}},
+
+    {"scenes/keys", {"tracing/*", "renderer/*", "volumes/*"}},
+    {"scenes/source", {"scenes/keys", "tracing/*", "renderer/*", "volumes/*"}},
+    {"scenes/description", {"scenes/keys", "tracing/*", "renderer/*", "volumes/*"}},
+    {"scenes/scene", {"scenes/description", "tracing/*", "renderer/*", "volumes/*"}},
+    {"scenes/outputs", {"scenes/scene", "scenes/description", "tracing/*", "renderer/*", "volumes/*"}},
+    {"scenes/jobs", {"scenes/scene", "scenes/description", "scenes/keys", "tracing/*", "renderer/*", "volumes/*"}},
+
+    {"integrators/path_files", {"tracing/*", "renderer/*", "volumes/*"}},
     {"integrators/seeds", {"renderer/*", "volumes/*"}},
-    {"integrators/photons", {"integrators/bending", "integrators/tracing", "renderer/*", "volumes/*"}},
-    {"integrators/view", {"integrators/bending", "integrators/tracing", "renderer/*", "volumes/*"}},
-    {"integrators/probes", {"integrators/bending", "integrators/tracing", "renderer/*", "volumes/*"}},
-
-    {"scenes/keys", {"integrators/*", "renderer/*", "volumes/*"}},
-    {"scenes/source", {"scenes/keys", "integrators/*", "renderer/*", "volumes/*"}},
-    {"scenes/description", {"scenes/keys", "integrators/*", "renderer/*", "volumes/*"}},
-    {"scenes/scene", {"scenes/description", "integrators/*", "renderer/*", "volumes/*"}},
-    {"scenes/outputs", {"scenes/scene", "scenes/description", "integrators/*", "renderer/*", "volumes/*"}},
-    {"scenes/jobs", {"scenes/scene", "scenes/description", "scenes/keys", "integrators/*", "renderer/*", "volumes/*"}},
-    {"scenes/photons",
-     {"scenes/outputs", "scenes/scene", "scenes/description", "integrators/*", "renderer/*", "volumes/*"}},
-    {"scenes/lens",
-     {"scenes/outputs", "scenes/scene", "scenes/description", "scenes/keys", "integrators/*", "renderer/*",
-      "volumes/*"}},
-    {"scenes/stretch", {"scenes/outputs", "scenes/description", "integrators/*", "renderer/*", "volumes/*"}},
-    {"scenes/path_tracing",
-     {"scenes/photons", "scenes/outputs", "scenes/scene", "scenes/description", "scenes/keys", "integrators/*",
+    {"integrators/photon_distribution", {"scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
+    {"integrators/lens", {"scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
+    {"integrators/stretch", {"scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
+    {"integrators/path_tracing",
+     {"integrators/path_files", "integrators/photon_distribution", "integrators/seeds", "scenes/*", "tracing/*",
       "renderer/*", "volumes/*"}},
-    {"scenes/scene_method",
-     {"scenes/path_tracing", "scenes/outputs", "scenes/scene", "scenes/description", "scenes/keys", "integrators/*",
-      "renderer/*", "volumes/*"}},
-    {"scenes/pipeline",
-     {"scenes/photons", "scenes/lens", "scenes/stretch", "scenes/path_tracing", "scenes/scene_method",
-      "scenes/description", "scenes/source", "integrators/*", "renderer/*", "volumes/*"}},
+    {"integrators/scene", {"integrators/path_tracing", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
+    {"integrators/methods", {"integrators/*", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
 
-    {"python/module", {"scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+    {"python/module", {"integrators/*", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
 
     {"tools/command_line", {}},
     {"tools/ranks", {}},
@@ -119,14 +105,16 @@ const std::vector<Room> rooms{
      {"tools/import/cases", "tools/import/lattice_files", "tools/import/lattices", "tools/import/meshes",
       "tools/import/sampling", "tools/import/vtk", "tools/import/vtk_formats", "tools/import/vtk_source", "volumes/*"}},
     {"tools/import/program", {"tools/import", "tools/import/vtk_formats", "tools/command_line", "volumes/*"}},
-    {"tools/viewer", {"scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+    {"tools/viewer", {"integrators/*", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
     {"tools/viewer/server", {"tools/viewer"}},
     {"tools/viewer/program", {"tools/viewer", "tools/viewer/server", "tools/command_line", "renderer/*"}},
-    {"tools/rendering", {"tools/command_line", "tools/ranks", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+    {"tools/rendering",
+     {"tools/command_line", "tools/ranks", "integrators/*", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
     {"tools/commands",
-     {"tools/rendering", "tools/command_line", "tools/ranks", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+     {"tools/rendering", "tools/command_line", "tools/ranks", "integrators/*", "scenes/*", "tracing/*", "renderer/*",
+      "volumes/*"}},
     {"tools", {"tools/commands", "tools/command_line", "renderer/meshes"}},
-    {"tools/benchmark", {"tools/viewer", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+    {"tools/benchmark", {"tools/viewer", "integrators/*", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
 };
 
 /// Whether `name`, an item of `may_include`, means the room `folder`.
@@ -195,7 +183,7 @@ TEST(Structure, NothingIncludesUpwards) {
 /// A room is read at one sitting: it has about a dozen files.
 TEST(Structure, RoomsHaveAboutADozenFiles) {
   const std::map<std::string, std::size_t> crowded{
-      {"scenes/path_tracing", 16},  // One method; what it shares with `scene` needs its description.
+      {"integrators/path_tracing", 16},  // One method; what it shares with `scene` needs its description.
   };
   constexpr std::size_t most = 14;
   std::map<std::string, std::set<std::string>> files;

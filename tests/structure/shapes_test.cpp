@@ -140,7 +140,7 @@ TEST(Structure, FunctionsAreDefinedInTheRoomThatDeclaresThem) {
       EXPECT_TRUE(replaced.count(name) || !rooms.count(name) || rooms[name].count(folder_of(file)))
           << file << " defines " << name << ", which a header of another room declares";
   }
-  EXPECT_TRUE(rooms.at("trace").count("integrators/tracing"));
+  EXPECT_TRUE(rooms.at("trace").count("tracing/trace"));
 }
 
 }  // namespace

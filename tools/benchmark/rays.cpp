@@ -12,9 +12,9 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
-#include "integrators/tracing/trace.h"
 #include "renderer/meshes/mesh.h"
 #include "tools/benchmark/questions.h"
+#include "tracing/trace/trace.h"
 #include "volumes/making/generators.h"
 
 namespace tensorray::bench {

@@ -12,7 +12,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "scenes/pipeline/read_scene.h"
+#include "integrators/methods/read_scene.h"
 #include "tools/benchmark/questions.h"
 #include "tools/viewer/pages.h"
 

@@ -19,8 +19,8 @@ void add_make_command(CLI::App& program, Progress& progress);     ///< tensorray
 void add_import_command(CLI::App& program);  ///< Lists `import` in --help; become_import_program runs it.
 void add_view_command(CLI::App& program);    ///< Lists `view` in --help; become_view_program runs it.
 void add_derive_command(CLI::App& program, Progress& progress);  ///< tensorray derive FIELD.vdb: its invariants.
-void add_info_command(CLI::App& program);      ///< tensorray info FILE.vdb: what a file holds.
-void add_schema_command(CLI::App& program);    ///< tensorray schema: the JSON Schema of scenes.
+void add_info_command(CLI::App& program);                        ///< tensorray info FILE.vdb: what a file holds.
+void add_schema_command(CLI::App& program);                      ///< tensorray schema: the JSON Schema of scenes.
 
 /// Replaces this program by `tensorray-import`, which runs `tensorray import`, because only `tensorray-import`
 /// contains VTK.

@@ -7,7 +7,7 @@
 #include "base/process/child_program.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"
-#include "scenes/pipeline/read_scene.h"
+#include "integrators/methods/read_scene.h"
 #include "tools/command_line/tell.h"
 
 namespace tensorray {

@@ -1,7 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "scenes/pipeline/read_scene.h"
+#include "integrators/methods/read_scene.h"
 #include "tools/commands/commands.h"
 
 namespace tensorray {

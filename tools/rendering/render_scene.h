@@ -10,8 +10,8 @@
 
 #include "base/process/job.h"
 #include "base/process/progress.h"
+#include "integrators/methods/read_scene.h"
 #include "scenes/jobs/work_file.h"
-#include "scenes/pipeline/read_scene.h"
 #include "scenes/scene/scene.h"
 
 namespace tensorray {

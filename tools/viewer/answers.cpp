@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/text/text.h"
-#include "integrators/tracing/trace.h"
+#include "tracing/trace/trace.h"
 
 namespace tensorray {
 namespace {

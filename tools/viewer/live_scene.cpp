@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "integrators/flow/ray_memory.h"
-#include "scenes/pipeline/read_scene.h"
+#include "integrators/methods/read_scene.h"
+#include "tracing/flow/ray_memory.h"
 
 namespace tensorray {
 namespace {

@@ -15,9 +15,9 @@
 #include "base/files/output_file.h"
 #include "base/process/seconds.h"
 #include "base/text/text.h"
+#include "integrators/methods/read_scene.h"
 #include "scenes/description/run_files.h"
 #include "scenes/outputs/picture_outputs.h"
-#include "scenes/pipeline/read_scene.h"
 
 namespace tensorray {
 namespace {

@@ -20,10 +20,10 @@
 #include <vtkXMLPolyDataWriter.h>
 
 #include "integrators/path_files/path_files.h"
-#include "integrators/paths/cross_section.h"
 #include "tests/import/mesh_files.h"
-#include "tests/integrators/path_support.h"
+#include "tests/tracing/path_support.h"
 #include "tools/import/vtk_formats/vtp_files.h"
+#include "tracing/paths/cross_section.h"
 
 namespace tensorray {
 namespace {

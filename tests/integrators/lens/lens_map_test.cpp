@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
-#include "tests/integrators/support.h"
+#include "tests/tracing/support.h"
 #include "volumes/making/generators.h"
 
 namespace tensorray {

@@ -13,8 +13,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/integrators/path_support.h"
 #include "tests/renderer/support.h"
+#include "tests/tracing/path_support.h"
 
 namespace tensorray {
 namespace {

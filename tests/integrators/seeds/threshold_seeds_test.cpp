@@ -5,8 +5,8 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "tests/integrators/support.h"
 #include "tests/renderer/support.h"
+#include "tests/tracing/support.h"
 
 namespace tensorray {
 namespace {

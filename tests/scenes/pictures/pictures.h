@@ -20,10 +20,10 @@
 #include <unistd.h>
 
 #include "base/process/progress.h"
+#include "integrators/methods/read_scene.h"
 #include "renderer/images/image.h"
 #include "scenes/outputs/statistics_json.h"
 #include "scenes/outputs/write_outputs.h"
-#include "scenes/pipeline/read_scene.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 

@@ -1,0 +1,311 @@
+#include "integrators/lens/lens_method.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include "base/constants.h"
+#include "integrators/lens/lens.h"
+#include "integrators/lens/lens_obstacles.h"
+#include "integrators/lens/load_lens.h"
+#include "renderer/charts/grid_lines.h"
+#include "renderer/spectra/reflectance.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/outputs/annotations.h"
+#include "scenes/outputs/channel_table.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "scenes/scene/fine_bands.h"
+
+namespace tensorray {
+namespace {
+
+constexpr int overlay_cells = 16;           // Cells along the image's shorter side.
+constexpr double most_overlay_cells = 1e6;  // A limit; grids are too dense to be visible long before.
+/// The light of a band is spread evenly over the points that it sees; so this step decides only how exact the colours
+/// within a fringe are. With 10 bands or more a reflectance can have any colour of Rec. 709.
+constexpr BandStep band_step{16, 12, 24};
+constexpr int gap_part = 64;  // The gap between pictures side by side is the width of a picture divided by this.
+
+/// A function that converts a colour of the image to its radiance in some bands.
+LensRadiance radiance_in(const std::vector<FineBand>& fine, const Scene& scene) {
+  if (scene.description.bending.rgb) {
+    const Eigen::Matrix3d to_primaries = (scene.color.xyz_to_working() * rec709_to_xyz()).inverse();
+    return [to_primaries](const Eigen::Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+      const Eigen::Vector3d primaries = to_primaries * rgb;
+      std::copy(primaries.data() + first, primaries.data() + last, radiances);
+    };
+  }
+  std::vector<Band> bands;
+  for (const FineBand& each : fine) bands.push_back(each.band);
+  // Light that has no white does not define the spectrum of a colour. Daylight is used for it instead.
+  const std::vector<Band> light = has_white(scene) ? bands : make_bands(illuminant("D65"), 380, 730, 36);
+  Eigen::Vector3d white = Eigen::Vector3d::Zero();
+  for (const Band& band : light) white += band.xyz;
+  const ReflectanceModel model(light, scene.color.xyz_to_working_adapted(white));
+  return [model, bands](const Eigen::Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+    const ReflectanceSpectrum spectrum = model.spectrum(rgb);
+    for (std::size_t i = first; i < last; ++i) radiances[i - first] = spectrum.at(bands[i].wavelength);
+  };
+}
+
+std::vector<LensBand> lens_bands(const std::vector<FineBand>& fine, const Scene& scene) {
+  const Eigen::Matrix3d xyz_to_working = to_working(scene);
+  std::vector<LensBand> bands;
+  for (const FineBand& each : fine)
+    bands.push_back({each.begin, each.end, each.channel, each.weight, xyz_to_working * each.band.xyz});
+  return bands;
+}
+
+/// What is known of a pixel.
+struct LensPixel {
+  Eigen::Vector3f color;
+  double alpha;
+  const LensPoint& point;
+};
+
+double bounded(double logarithm) { return std::clamp(logarithm, -100.0, 100.0); }
+
+ChannelTable<LensPixel> lens_channels() {
+  using Pixel = const LensPixel&;
+  return {{{"R", "G", "B"},
+           "The picture, scene-linear: 1 is the white of the image. Multiplied by A.",
+           [](Pixel pixel) { return pixel.color; }},
+          {{"A"},
+           "The part of the pixel that sees the image, of the band that sees the largest part: it is 0 only where no "
+           "band sees any, and colours are dark where bands are missing.",
+           [](Pixel pixel) { return std::min(pixel.alpha, 1.0); }},  // Rounding may make the sum greater than 1.
+          {{"texture.s", "texture.t"},
+           "The place in the image: (0, 0) is the lower left, (1, 1) the upper right corner, as in ST maps.",
+           [](Pixel pixel) { return pixel.point.st; }},
+          {{"displacement.x", "displacement.y", "displacement.z"},
+           "From the point that straight light would show to the point that is seen; world units.",
+           [](Pixel pixel) { return pixel.point.displacement; }},
+          {{"magnification.log"},
+           "ln of the area that a part of the image has in the picture, divided by its own area: positive where the "
+           "part is enlarged.",
+           [](Pixel pixel) { return bounded(pixel.point.log_magnification); }},
+          {{"magnification.major", "magnification.minor"},
+           "The same along the two principal directions: ln σ₁ ≥ ln σ₂ of the Jacobian. From −100 to 100.",
+           [](Pixel pixel) -> Eigen::Vector2d {
+             return {bounded(pixel.point.log_stretch[0]), bounded(pixel.point.log_stretch[1])};
+           }},
+          {{"folds"},
+           "`scatter`: the number of sheets of the image at this pixel. `gather`: the number of places in the picture "
+           "that show what is seen here. 1: no fold.",
+           [](Pixel pixel) { return pixel.point.folds; }},
+          {{"length"}, "The length of the ray, world units.", [](Pixel pixel) { return pixel.point.length; }},
+          {{"end"},
+           "`gather`: 0 sees the image, 1 missed it, 2 met an obstacle (or turned back), 3 step limit, 4 degenerate, 5 "
+           "beside the image. `scatter`: 0 sees the image, 1 no light lands here.",
+           [](Pixel pixel) { return static_cast<int>(pixel.point.end); }}};
+}
+
+Image make_image(const LensPicture& picture) {
+  const Image colors = color_image(picture.color);
+  const ChannelTable<LensPixel> table = lens_channels();
+  Image image(colors.width, colors.height, channel_names(table));
+  for (std::size_t i = 0; i < picture.points.size(); ++i)
+    write_channels(table, {Eigen::Vector3f(&colors.pixels[3 * i]), picture.alpha[i], picture.points[i]},
+                   &image.pixels[i * image.channels.size()]);
+  return image;
+}
+
+/// Draws the lines of a grid on the image twice: straight as without the field, and distorted as the lens shows them.
+void draw_overlay(const LensPicture& picture, const Plate& plane, Image& image) {
+  std::vector<PixelCoordinates> straight, seen;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const LensPoint& point = picture.points[static_cast<std::size_t>(y) * image.width + x];
+      straight.push_back({true, picture.straight * Eigen::Vector2d(x + 0.5, y + 0.5), picture.straight.linear()});
+      seen.push_back({point.end == LensEnd::image, point.st, point.per_pixel});
+    }
+  const Eigen::Array2d cells =
+      (overlay_cells * plane.size / plane.size.minCoeff()).array().round().min(most_overlay_cells);
+  GridLines lines;
+  lines.cells = cells.cast<int>();
+  lines.width = 1;
+  lines.color = {0.05, 0.3, 0.9};
+  lines.opacity = 0.5;
+  draw_grid_lines(image, straight, lines);
+  lines.width = 1.75;
+  lines.color = {0.9, 0.15, 0.02};
+  lines.opacity = 0.9;
+  draw_grid_lines(image, seen, lines);
+}
+
+/// Puts pictures side by side. All channels are 0 in the gaps.
+Image side_by_side(const std::vector<Image>& images) {
+  if (images.size() == 1) return images.front();
+  const int width = images.front().width, gap = std::max(1, width / gap_part);
+  const int count = static_cast<int>(images.size());
+  Image all(count * width + (count - 1) * gap, images.front().height, images.front().channels);
+  for (int i = 0; i < count; ++i)
+    for (int y = 0; y < all.height; ++y)
+      std::copy_n(images[static_cast<std::size_t>(i)].pixel(0, y), width * all.channels.size(),
+                  all.pixel(i * (width + gap), y));
+  return all;
+}
+
+void add_statistics(const LensPicture& picture, Statistics& statistics) {
+  statistics.ends.resize(picture.ends.size());
+  for (std::size_t channel = 0; channel < picture.ends.size(); ++channel)
+    for (int end = 0; end < ray_end_count; ++end) statistics.ends[channel][end] += picture.ends[channel][end];
+  statistics.ray_steps += picture.counts.ray_steps;
+  statistics.tensor_samples += picture.counts.tensor_samples;
+  statistics.seconds_drawing += picture.seconds_drawing;
+}
+
+std::string end_codes() {
+  std::string text;
+  for (int end = 0; end < lens_end_count; ++end)
+    text += fmt::format("{}{} {}", end ? ", " : "", end, to_string(static_cast<LensEnd>(end)));
+  return text;
+}
+
+/// The pictures of some depths, and their statistics.
+struct LensPictures {
+  std::vector<Image> pictures;
+  std::vector<SpectralImage> spectra;
+  Statistics statistics;
+};
+
+class LoadedLens : public LoadedMethod {
+ public:
+  LoadedLens(LensDescription settings, LensScene scene) : settings_(std::move(settings)), lens_(std::move(scene)) {}
+
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
+
+ private:
+  LensSettings trace_settings(const Scene& scene) const;
+  void add_picture(const Scene& scene, const LensLight& light, const Progress& progress, LensPictures& all) const;
+  Render render_of(const Scene& scene, LensPictures all) const;
+
+  LensDescription settings_;
+  LensScene lens_;
+};
+
+/// Puts spectral pictures side by side.
+SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
+  std::vector<Image> images;
+  for (SpectralImage& spectrum : spectra) images.push_back(std::move(spectrum.image));
+  SpectralImage all = std::move(spectra.front());
+  all.image = side_by_side(images);
+  return all;
+}
+
+LensSettings LoadedLens::trace_settings(const Scene& scene) const {
+  LensSettings settings;
+  settings.mode = settings_.mode;
+  settings.samples = settings_.samples;
+  settings.reference = reference_place(scene);
+  const LightRange range = light_range(scene);
+  settings.flexibilities = range.flexibilities;
+  settings.range = range.is_range;
+  return settings;
+}
+
+/// Draws the light of one depth. Of a team, process 0 has the picture.
+void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const Progress& progress,
+                             LensPictures& all) const {
+  const int channels = static_cast<int>(scene.bands.size());
+  const bool by_channel = scene.description.output.wants("spectral");
+  const std::vector<FineBand> fine = fine_bands(scene, band_count(light.map, channels, band_step));
+  const LensPicture picture =
+      draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
+  const Plate& plane = light.setup.image.plane;
+  all.pictures.push_back(make_image(picture));
+  if (settings_.obstacles == ObstacleLook::shaded)
+    LensObstacles(scene.geometry.surfaces(), lens_.receiver, scene.beam.direction)
+        .draw(plane, settings_.samples, all.pictures.back());
+  if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, all.pictures.back());
+  add_statistics(picture, all.statistics);
+  all.statistics.seconds_tracing += light.seconds_tracing;
+  if (by_channel)
+    // A white image has the radiance of a white diffuse surface in the scene's light.
+    all.spectra.push_back(spectral_image(picture.radiance, scene.bands, SpectralQuantity::radiance,
+                                         scene.description.light.irradiance / pi, to_working(scene)));
+}
+
+Render LoadedLens::render_of(const Scene& scene, LensPictures all) const {
+  Render result;
+  result.linear = side_by_side(all.pictures);
+  if (!all.spectra.empty()) result.spectral = spectra_side_by_side(std::move(all.spectra));
+  result.statistics = std::move(all.statistics);
+  for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)])
+    result.statistics.positions += count;
+  result.metadata["tensorray:end"] = end_codes();
+  result.view = view_of(lens_.receiver);
+  result.exposure = 0;  // Shows the colours of the image unchanged.
+  if (nothing_arrived(result.statistics))
+    result.warnings.push_back("no ray met the image; check `receiver` and `integrator.image_plane`");
+  return result;
+}
+
+Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
+  LensSettings settings = trace_settings(scene);
+  settings.job = job;
+  const bool is_shard = job && job->is_shard;
+  Ranks* const ranks = job ? job->ranks : nullptr;
+  LensPictures all;
+  if (job && job->show && is_root(ranks))
+    settings.show = [&](const std::function<const LensLight&()>& so_far) {
+      if (!job->picture_wanted.exchange(false)) return;
+      LensPictures shown = all;
+      add_picture(scene, so_far(), progress, shown);
+      job->show(render_of(scene, std::move(shown)));
+    };
+  LensImage image;
+  image.texture = &lens_.image;
+  image.wraps = lens_.wraps;
+  for (const Plate& plane : lens_.planes) {
+    image.plane = plane;
+    const LensLight light = trace_lens(scene.field, scene.geometry.surfaces(), scene.bending,
+                                       {lens_.receiver, image, scene.beam.direction}, settings, progress);
+    if (!is_shard) add_picture(scene, light, progress, all);
+  }
+  gather_counts(ranks, all.statistics);
+  return is_shard || !is_root(ranks) ? Render() : render_of(scene, std::move(all));
+}
+
+class LensMethod : public MethodWith<LensDescription> {
+ public:
+  const char* name() const override { return "lens"; }
+  bool shows_plate() const override { return true; }
+
+  std::vector<Output> outputs() const override {
+    std::vector<Output> outputs = picture_outputs();
+    outputs.push_back(spectral_output());
+    return outputs;
+  }
+
+  std::vector<ChannelText> channels() const override { return channel_texts(lens_channels()); }
+
+  std::vector<NamedFile> inputs() const override {
+    const auto* file = std::get_if<std::filesystem::path>(&settings().image);
+    return {{file ? *file : std::filesystem::path(), "`/integrator/image`"}};
+  }
+
+  void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
+    check_normal(settings().plane.normal, "/integrator/image_plane", scene.light, source);
+    if (!chosen) return;
+    check_spectral_output(scene, source);
+    warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
+    // The flow map, and the points of a picture with its colours; the channels of each depth, and of all side by side.
+    const auto& depth = settings().plane.depth;
+    const double more_pictures = depth && !depth->empty() ? static_cast<double>(depth->size() - 1) : 0;
+    const double spectral = scene.output.wants("spectral") ? 16.0 * channel_count(scene) : 0;
+    check_receiver_memory(scene, 280 + spectral + more_pictures * (120 + spectral / 2), source);
+  }
+
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
+    return std::make_unique<LoadedLens>(settings(), load_lens(scene, settings(), notes));
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<Method> lens_method() { return std::make_shared<LensMethod>(); }
+
+}  // namespace tensorray

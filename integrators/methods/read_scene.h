@@ -1,0 +1,52 @@
+#pragma once
+/// @file integrators/methods/read_scene.h
+/// Scene file → SceneDescription. Reads no other file.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scenes/description/description.h"
+
+namespace tensorray {
+
+/// Changes to a scene file from the command line.
+struct SceneChanges {
+  /// "KEY=VALUE". KEY is a list of keys with dots between them ("light.photons", "obstacles.0.file"). VALUE is JSON; if
+  /// it is not valid JSON, it is a string. Overrides are applied in order, before anything is checked. The value null
+  /// removes a key. An index one past the end of a list appends an item.
+  std::vector<std::string> overrides;
+
+  /// Files to write instead of those of the scene, relative to the working folder. The ending of each file selects one
+  /// of the method's outputs.
+  std::vector<std::filesystem::path> outputs;
+
+  /// The frame of a scene that changes (see set_frame); # in `outputs` is its number, too. None: the scene must not
+  /// have keyframes.
+  std::optional<int> frame = std::nullopt;
+};
+
+/// Whether a path names a field, an OpenVDB file, and not a scene.
+bool is_field_file(const std::filesystem::path& path);
+
+/// Reads a scene file: JSON with comments; of a field's file, which is not opened, it makes a scene of defaults.
+/// Relative paths in it are relative to the scene file's folder. If no output file is named, `image` and `exr` are
+/// files beside the scene file, with its name and .png and .exr.
+/// @throw SceneError: the file is unreadable or not JSON; a key is unknown (with the nearest valid one), missing, of
+/// the wrong type or out of range; two keys exclude each other.
+SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes = {});
+
+/// The first step of read_scene: the scene as JSON, with `overrides` applied, and otherwise unchecked.
+Json scene_json(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
+
+/// The other step: JSON → SceneDescription. @param changes  Its overrides have no effect.
+SceneDescription read_scene_json(Json json, const std::filesystem::path& path, const SceneChanges& changes = {});
+
+/// Whether numbers may have keyframes, as in a scene of which frames are rendered.
+enum class SchemaKind { one_frame, with_keyframes };
+
+/// The JSON Schema (draft 2020-12) of scene files, made from the same tables of keys that read_scene uses.
+std::string scene_schema(SchemaKind kind = SchemaKind::one_frame);
+
+}  // namespace tensorray

@@ -1,0 +1,272 @@
+#include "integrators/path_tracing/path_tracing_method.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "base/process/progress.h"
+#include "base/process/seconds.h"
+#include "integrators/path_files/path_files.h"
+#include "integrators/path_tracing/context_surfaces.h"
+#include "integrators/path_tracing/path_colors.h"
+#include "integrators/path_tracing/path_surfaces.h"
+#include "integrators/path_tracing/path_tracing_keys.h"
+#include "integrators/path_tracing/stage.h"
+#include "integrators/path_tracing/studio.h"
+#include "renderer/camera/path_tracer.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/outputs/annotations.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "tracing/paths/paths.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double most_radii = 2e5;  // Rays start 5e-7 diagonals away from a surface, which is then a tenth of a radius.
+constexpr double legend_width = 0.2;    // Part of the picture's width that a chosen camera leaves free.
+constexpr double tube_tolerance = 0.2;  // Pixels: greatest distance of a tube's triangles from its surface.
+
+/// The points that a camera without a given position must show.
+std::vector<Eigen::Vector3d> points_of_interest(const Scene& scene, const ContextDescription& context,
+                                                const std::vector<Path>& paths) {
+  std::vector<Eigen::Vector3d> points;
+  for (const Path& path : paths)
+    for (const PathPoint& point : path.points) points.push_back(point.position);
+  const auto add = [&points](const std::vector<Eigen::Vector3d>& more) {
+    points.insert(points.end(), more.begin(), more.end());
+  };
+  if (context.box || context.slice) add(scene.field.corners());
+  if (context.obstacles)
+    for (const TriangleMesh& mesh : scene.geometry.surfaces().obstacles) add(mesh.vertices);
+  if (context.plate) add(scene.geometry.surfaces().plate->corners());
+  return points;
+}
+
+/// A tenth of the path points before the camera are nearer than this depth. Triangles may be visible there.
+double near_depth(const std::vector<Path>& paths, const Camera& camera) {
+  std::vector<double> depths;
+  for (const Path& path : paths)
+    for (const PathPoint& point : path.points)
+      if (const double depth = (point.position - camera.position).dot(camera.forward); depth > 0)
+        depths.push_back(depth);
+  if (depths.empty()) return camera.focus_distance;
+  const auto tenth = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 10);
+  std::nth_element(depths.begin(), tenth, depths.end());
+  return *tenth;
+}
+
+/// The surface of the paths, and their mesh for the output `tubes`.
+struct PathShapes {
+  ShadedSurface surface;
+  TubeMesh tubes;  ///< Empty if it is not written.
+};
+
+PathShapes make_shapes(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
+                       const PathColors& colors, const Camera& camera) {
+  const PathTracingDescription& description = path_scene.settings;
+  const double typical = typical_radius(description.radius, paths.size(), scene.field.world_box());
+  const double pixel = pixel_size(camera, camera.position + near_depth(paths, camera) * camera.forward);
+  const Eigen::Matrix3d& to_working = path_scene.lights.light.rec709_to_working;
+  PathShapes shapes;
+  TubeMesh mesh;
+  const bool writes = scene.description.output.wants("tubes");
+  if (writes || description.style != PathStyle::lines)
+    mesh = path_mesh(paths, description, colors, typical, tube_tolerance * pixel);
+  if (writes) shapes.tubes = mesh;
+  shapes.surface = description.style == PathStyle::lines
+                       ? line_surface(paths, description.radius.typical.value_or(0.75 * pixel), colors, to_working)
+                       : path_surface(std::move(mesh), paths, colors, to_working);
+  return shapes;
+}
+
+Camera scene_camera(const Scene& scene, const ContextDescription& context, const std::vector<Path>& paths,
+                    double free) {
+  try {
+    return make_camera(scene.description.camera, points_of_interest(scene, context, paths), free);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(fmt::format("{}: `/camera`: {}", scene.description.path.string(), error.what()));
+  }
+}
+
+/// Refuses a scene that is so large that the renderer would lose the paths, because its precision is relative to the
+/// size of the whole scene.
+void require_fine(const Scene& scene, const RadiusDescription& radius, const SurfaceScene& stage,
+                  const std::vector<Path>& paths) {
+  const double typical = typical_radius(radius, paths.size(), scene.field.world_box());
+  if (stage.bounds().diagonal().norm() < most_radii * typical) return;
+  throw SceneError(fmt::format(
+      "{}: paths are too thin ({:.3g}) for the size of the scene ({:.3g}); bring lamps, obstacles and plate nearer, or "
+      "raise `/integrator/radius/typical`",
+      scene.description.path.string(), typical, stage.bounds().diagonal().norm()));
+}
+
+/// Who renders a picture, and who hears of it.
+struct StageRun {
+  RenderJob* job;  ///< Null: this process alone, and nothing is kept.
+  const Progress& progress;
+  const RenderCallbacks& callbacks;
+};
+
+class LoadedPaths : public LoadedMethod {
+ public:
+  explicit LoadedPaths(PathScene paths) : paths_(std::move(paths)) {}
+
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
+
+ private:
+  /// Renders the paths, their context and the lamps.
+  SurfacePicture render_stage(const Scene& scene, const std::vector<Path>& paths, ShadedSurface path_surface,
+                              const Camera& camera, const StageRun& run) const;
+
+  PathScene paths_;
+};
+
+SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<Path>& paths, ShadedSurface path_surface,
+                                         const Camera& camera, const StageRun& run) const {
+  const ShownLight& light = paths_.lights.light;
+  std::vector<Material> materials{load_material(paths_.settings.material, light)};
+  std::vector<ShadedSurface> surfaces{std::move(path_surface)};
+  add_context(scene, paths_, run.job, run.progress, surfaces, materials);
+  const std::vector<Light> lights = make_lights(scene.description, paths_.lights, camera);
+  add_lamps(lights, light, surfaces, materials);
+  const SurfaceScene stage(std::move(surfaces));
+  require_fine(scene, paths_.settings.radius, stage, paths);
+  const LightSampler sampler(lights, light.luminances(), stage.bounds());
+  const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
+  ShadedScene shaded{stage, materials, sampler, table};
+  set_groups(light_groups(scene.description), shaded);
+  return render_surfaces(shaded, camera, tracer_settings(scene.description, paths_.settings), run.callbacks);
+}
+
+/// Whether the file of paths has the tensors at their points.
+bool stores_tensors(const OutputDescription& output) {
+  return output.wants("paths") && tensorray::stores_tensors(output.files.at("paths"));
+}
+
+Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
+  const PathTracingDescription& description = paths_.settings;
+  const OutputDescription& output = scene.description.output;
+  const bool has_picture = output.wants("image") || output.wants("exr") || output.wants("spectral");
+  const bool is_drawn = has_picture || output.wants("tubes");
+  const ShownLight& light = paths_.lights.light;
+  const auto start = Clock::now();
+  Render result;
+  result.paths = follow_paths(scene, paths_, is_drawn || stores_tensors(output), job, progress, result.statistics);
+  result.statistics.seconds_tracing = seconds_since(start);
+  if (!is_drawn) return result;
+
+  const auto drawing = Clock::now();
+  const PathColors colors =
+      path_colors(description.color, result.paths,
+                  typical_radius(description.radius, result.paths.size(), scene.field.world_box()));
+  // As an annotation, the legend covers a part of the picture: it has no effect on other files.
+  const bool has_room = description.color.legend && colors.legend;
+  const Camera camera = scene_camera(scene, description.context, result.paths, has_room ? legend_width : 0);
+  PathShapes shapes = make_shapes(scene, paths_, result.paths, colors, camera);
+  result.exposure = 0;
+  if (has_picture) result.view = view_of(camera);
+  if (colors.legend && (description.color.legend || output.wants(Annotation::legend)))
+    result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double) {
+      legend(image, matrix);
+    };
+  if (output.wants("tubes"))
+    result.write_tubes = [tubes = std::move(shapes.tubes), colors](const std::filesystem::path& file,
+                                                                   const std::vector<Path>& paths) {
+      write_tubes(file, tubes, paths, colors);
+    };
+  if (!has_picture) return result;
+
+  const LightGroups groups = light_groups(scene.description);
+  const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
+    render.linear = make_image(picture, light, description, groups);
+    if (output.wants("spectral"))
+      render.spectral =
+          spectral_image(picture.radiance, light.bands, SpectralQuantity::radiance, 1, light.xyz_to_working);
+  };
+  const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {
+    Render shown = result;
+    add_picture(picture, shown);
+    return shown;
+  });
+  const StageRun run{job, progress, callbacks};
+  add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, run), result);
+  result.statistics.seconds_drawing = seconds_since(drawing);
+  return result;
+}
+
+void check_range(const std::optional<Eigen::Vector2d>& range, bool logarithmic, const char* pointer,
+                 const SceneSource& source) {
+  if (!range) return;
+  if (!(range->x() < range->y()))
+    source.fail(fmt::format("`{}` must rise, but is [{:g}, {:g}]", pointer, range->x(), range->y()));
+  if (logarithmic && !(range->x() > 0))
+    source.fail(fmt::format("`{}` is logarithmic and must be above 0, but begins at {:g}", pointer, range->x()));
+}
+
+void check_seeds(const SeedDescription& seeds, const SceneSource& source) {
+  if (seeds.from && seeds.to && *seeds.from == *seeds.to && seeds.count > 1)
+    source.fail("`/integrator/seeds`: `from` and `to` are equal, which allows only one seed; set `count` to 1");
+  if (seeds.above && seeds.below && *seeds.above > *seeds.below)
+    source.fail("`/integrator/seeds`: `above` must not exceed `below`");
+}
+
+void write_path_file(const std::filesystem::path& file, const Scene&, const Render& render) {
+  write_paths(file, render.paths);
+}
+
+void write_tube_file(const std::filesystem::path& file, const Scene&, const Render& render) {
+  render.write_tubes(file, render.paths);
+}
+
+class PathTracingMethod : public MethodWith<PathTracingDescription> {
+ public:
+  const char* name() const override { return "path_tracing"; }
+  bool is_sampled() const override { return true; }
+
+  std::vector<Output> outputs() const override {
+    std::vector<Output> outputs = picture_outputs();
+    outputs.push_back(spectral_output());
+    outputs.push_back({"paths", "the bent rays, with all quantities along them", {".vtp", ".tck"}, write_path_file});
+    outputs.push_back({"tubes", "the bent rays as a mesh", {".ply", ".obj"}, write_tube_file});
+    return outputs;
+  }
+
+  std::vector<ChannelText> channels() const override { return surface_channel_texts(false); }
+
+  std::vector<NamedFile> inputs() const override {
+    return {{settings().paths, "`/integrator/paths`"}, {settings().seeds.file, "`/integrator/seeds/file`"}};
+  }
+
+  void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override;
+
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
+    return std::make_unique<LoadedPaths>(load_paths(scene, settings(), notes));
+  }
+};
+
+void PathTracingMethod::check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const {
+  const PathTracingDescription& paths = settings();
+  check_seeds(paths.seeds, source);
+  check_range(paths.color.range, paths.color.logarithmic, "/integrator/color/range", source);
+  if (paths.context.slice) check_range(paths.context.slice->range, false, "/integrator/context/slice/range", source);
+  if (paths.radius.min && paths.radius.max && *paths.radius.min > *paths.radius.max)
+    source.fail("`/integrator/radius`: `min` must not exceed `max`");
+  if (!chosen) return;
+  if (scene.bending.settings.max_steps > 1'000'000)
+    source.fail("`/bending/max_steps` must be at most 1e6 with path_tracing, which keeps every step of a path");
+  check_memory(scene.camera.resolution.cast<double>().prod() * (200.0 + 24.0 * paths.bands), "`/camera/resolution`",
+               source);
+  warn_unused(scene, json, "/integrator/seeds", "/integrator/paths");
+  if (given(json, "/integrator/samples"))  // Other programs and the lens use this name.
+    scene.warnings.push_back("`/integrator/samples` has no effect with path_tracing; use `/integrator/max_samples`");
+  if (scene.camera.target && !scene.camera.position)
+    scene.warnings.push_back(
+        "`/camera/target` has no effect without `/camera/position`: the camera is then chosen so that everything is "
+        "seen");
+}
+
+}  // namespace
+
+std::shared_ptr<Method> path_tracing_method() { return std::make_shared<PathTracingMethod>(); }
+
+}  // namespace tensorray

@@ -1,0 +1,74 @@
+#pragma once
+/// @file integrators/scene/field_region.h
+/// A tensor field in the view of a camera. Light is followed backwards, by Eq. 5 with −s. If there are no obstacles,
+/// some ways that allow a tolerance are interpolated (band_interpolation.h). The traced ways of their group must leave
+/// the volume through the same face of its box.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include "integrators/scene/band_interpolation.h"
+#include "renderer/lights/bending_region.h"
+#include "tracing/bending/bending.h"
+#include "tracing/bending/geometry.h"
+
+namespace tensorray {
+
+/// What stays constant along light in the field. Each choice is consistent; they are different models of the medium.
+enum class Conserve {
+  power,     ///< A photon's power, as on the plates of this project: radiance changes (RayBatch).
+  radiance,  ///< Radiance, as in the lens of this project: a photon's power changes instead.
+};
+
+struct FieldViewSettings {
+  BendingSettings bending;  ///< With the scale of the field.
+  Conserve conserve = Conserve::power;
+  double most_radiance_scale = 0;  ///< Greatest factor on radiance, > 0, or 0: no limit. Limited ways lose light.
+  /// Flexibility of the light at a place, 0 to 1, within a band. Any thread may call it.
+  std::function<double(int band, double place)> flexibility;
+};
+
+/// Field and geometry must outlive it.
+class FieldRegion final : public BendingRegion {
+ public:
+  /// @param geometry  Bounds, cut, and all obstacles that lie in the volume. Ways end on them; those that leave the
+  ///                  volume may end on obstacles outside it, too. Ways may start on obstacles. Obstacles in front of
+  ///                  the volume are not looked for.
+  FieldRegion(const TensorField& field, const Geometry& geometry, FieldViewSettings settings);
+
+  double entry(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
+  void trace_radiance(std::vector<BentRay>& ways) const override;
+  void trace_importance(std::vector<BentRay>& ways) const override;
+
+  /// Tensor samples and steps of all ways so far.
+  std::uint64_t tensor_samples() const { return tensor_samples_; }
+  std::uint64_t steps() const { return steps_; }
+
+  /// Number of ways that were followed back to this end. Interpolated ways do not count.
+  std::uint64_t ways(RayEnd end) const { return ends_[static_cast<std::size_t>(end)]; }
+  /// Number of ways whose factor on radiance was above the limit.
+  std::uint64_t limited() const { return limited_; }
+
+ private:
+  Eigen::Vector3d start_of(const BentRay& way) const;
+  void follow(double sign, bool scales, std::vector<BentRay>& ways) const;
+  void follow_some(const std::vector<std::size_t>& which, std::vector<BentRay>& ways) const;
+  void follow_groups(std::vector<BandGroup> groups, std::vector<BentRay>& ways) const;
+  bool end_alike(const BandGroup& group, const std::vector<BentRay>& ways) const;
+  int face_at(const Eigen::Vector3d& position) const;
+
+  const TensorField& field_;
+  const Geometry& geometry_;
+  FieldViewSettings settings_;
+  double rounding_;  ///< World units.
+  mutable tbb::enumerable_thread_specific<RayBatch> memory_;
+  mutable std::array<std::atomic<std::uint64_t>, ray_end_count> ends_{};
+  mutable std::atomic<std::uint64_t> limited_{0}, tensor_samples_{0}, steps_{0};
+};
+
+}  // namespace tensorray

@@ -1,0 +1,175 @@
+#include "integrators/stretch/stretch_method.h"
+
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/process/progress.h"
+#include "base/process/seconds.h"
+#include "integrators/stretch/stretch.h"
+#include "renderer/charts/color_bar.h"
+#include "renderer/charts/colormap.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/outputs/annotations.h"
+#include "scenes/outputs/channel_table.h"
+#include "scenes/outputs/picture_outputs.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double default_wavelength = 550;  // nm
+constexpr Colormap map = Colormap::viridis;
+
+/// The geometry of the scene without the plate, on which rays would end.
+Geometry without_plate(const Scene& scene) {
+  Surfaces surfaces = scene.geometry.surfaces();
+  surfaces.plate.reset();
+  return Geometry(std::move(surfaces));
+}
+
+/// The bounding rectangle of the beam's aperture, in the plane where the light reaches the volume first.
+Plate entry_plane(const Scene& scene, int pixels) {
+  Eigen::AlignedBox2d aperture;
+  for (const Eigen::Vector2d& corner : scene.beam.aperture) aperture.extend(corner);
+  Plate plane;
+  plane.center = scene.beam.center +
+                 depth_range(scene.field, scene.beam.center, scene.beam.direction).near * scene.beam.direction +
+                 aperture.center().x() * scene.beam.right + aperture.center().y() * scene.beam.up;
+  plane.up = scene.beam.up;
+  plane.right = plane.up.cross(-scene.beam.direction);
+  plane.size = aperture.sizes();
+  plane.resolution = (pixels * plane.size / plane.size.maxCoeff()).array().round().max(1).matrix().cast<int>();
+  return plane;
+}
+
+/// Settings for light of one flexibility along the beam. @throw SceneError if its length is 0.
+StretchSettings settings_of(const Scene& scene, const StretchDescription& description) {
+  const BendingDescription& bending = scene.description.bending;
+  const DepthRange depths = depth_range(scene.field, scene.beam.center, scene.beam.direction);
+  StretchSettings settings;
+  settings.direction = scene.beam.direction;
+  settings.flexibility =
+      bending.rgb ? bending.rgb->y() : bending.flexibility.at(description.wavelength.value_or(default_wavelength));
+  settings.length = description.length.value_or(depths.far - depths.near);
+  if (!(settings.length > 0))
+    throw SceneError(scene.description.path.string() +
+                     ": `/integrator/stretch/length` is needed: the volume has no depth along the light");
+  return settings;
+}
+
+ImageMetadata metadata_of(const StretchSettings& settings) {
+  const Eigen::Vector3d& direction = settings.direction;
+  return {{"tensorray:units", "1/length"},
+          {"tensorray:length", fmt::format("{}", settings.length)},
+          {"tensorray:flexibility", fmt::format("{}", settings.flexibility)},
+          {"tensorray:direction", fmt::format("{} {} {}", direction.x(), direction.y(), direction.z())}};
+}
+
+/// What is known of a pixel whose ray has a value.
+struct StretchPixel {
+  Eigen::Vector3f color;
+  float stretch;
+};
+
+ChannelTable<StretchPixel> stretch_channels() {
+  using Pixel = const StretchPixel&;
+  return {{{"R", "G", "B"},
+           "The colour of the colour map, scene-linear; 0 where A is.",
+           [](Pixel pixel) { return pixel.color; }},
+          {{"A"}, "1; 0 if the ray does not meet the volume, or ends before the length.", [](Pixel) { return 1; }},
+          {{"stretch"}, "ln σ / L, in 1 / world unit; 0 where A is.", [](Pixel pixel) { return pixel.stretch; }}};
+}
+
+/// Makes the pictures from the values at the pixels of the entry plane, which is seen along the light as the plate is.
+void draw(const Scene& scene, const std::vector<float>& values, const Eigen::Vector2i& resolution, Render& render) {
+  const ValueRange range = choose_range({values.begin(), values.end()});
+  const Eigen::Matrix3d to_working = scene.color.xyz_to_working() * rec709_to_xyz();
+  const ChannelTable<StretchPixel> table = stretch_channels();
+  Image linear(resolution.x(), resolution.y(), channel_names(table));
+  Image display(resolution.x(), resolution.y(), {"R", "G", "B", "A"});
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (std::isnan(values[i])) continue;
+    const double position = range.position(values[i]);
+    write_channels(table, {(to_working * colormap_linear(map, position)).cast<float>(), values[i]},
+                   &linear.pixels[i * linear.channels.size()]);
+    Eigen::Map<Eigen::Vector4f>(&display.pixels[4 * i]) = colormap_srgb(map, position).cast<float>().homogeneous();
+  }
+  draw_color_bar(display, {"stretch", range, [](double position) { return colormap_srgb(map, position); }});
+  render.linear = std::move(linear);
+  render.display = std::move(display);
+}
+
+class LoadedStretch : public LoadedMethod {
+ public:
+  LoadedStretch(const StretchDescription& description, const StretchSettings& settings)
+      : description_(description), settings_(settings) {}
+
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override {
+    const auto start = Clock::now();
+    StretchSettings settings = settings_;
+    settings.job = job;
+    const OutputDescription& output = scene.description.output;
+    const Geometry geometry = without_plate(scene);
+    Render result;
+    result.metadata = metadata_of(settings_);
+    if (output.wants("stretch")) {
+      result.grids.push_back(
+          stretch_grid(scene.field, geometry, scene.bending, settings, description_.resolution, progress));
+      const ImageMetadata metadata = provenance(scene, result);
+      result.grids.back().metadata.insert(metadata.begin(), metadata.end());
+    }
+    if (output.wants("image") || output.wants("exr")) {
+      const Plate plane = entry_plane(scene, description_.pixels);
+      if (job && job->show && is_root(job->ranks))
+        settings.show = [&](const std::vector<float>& picture) {
+          if (!job->picture_wanted.exchange(false)) return;
+          Render so_far = result;
+          draw(scene, picture, plane.resolution, so_far);
+          job->show(std::move(so_far));
+        };
+      draw(scene, stretch_picture(scene.field, geometry, scene.bending, settings, plane, progress), plane.resolution,
+           result);
+      result.view = view_of(plane);
+    }
+    result.statistics.seconds_tracing = seconds_since(start);
+    return result;
+  }
+
+ private:
+  StretchDescription description_;
+  StretchSettings settings_;
+};
+
+class StretchMethod : public MethodWith<StretchKeys> {
+ public:
+  const char* name() const override { return "stretch"; }
+
+  std::vector<Output> outputs() const override {
+    std::vector<Output> outputs = picture_outputs();
+    outputs.push_back({"stretch", "the stretch in the volume, as a float grid", {".vdb"}, write_grids});
+    return outputs;
+  }
+
+  std::vector<ChannelText> channels() const override { return channel_texts(stretch_channels()); }
+
+  void check(SceneDescription& scene, const Json&, const SceneSource& source, bool chosen) const override {
+    if (chosen && scene.bending.rgb && settings().stretch.wavelength)
+      source.fail(
+          "`/integrator/stretch/wavelength`: light has no wavelength where `/bending/rgb` is given; remove one "
+          "of the two");
+  }
+
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
+    const StretchSettings chosen = settings_of(scene, settings().stretch);
+    notes.push_back(
+        fmt::format("stretch: of light with s = {:.4g}, over a length of {:.6g}", chosen.flexibility, chosen.length));
+    return std::make_unique<LoadedStretch>(settings().stretch, chosen);
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<Method> stretch_method() { return std::make_shared<StretchMethod>(); }
+
+}  // namespace tensorray

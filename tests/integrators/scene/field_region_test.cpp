@@ -1,0 +1,277 @@
+#include "integrators/scene/field_region.h"
+
+#include <array>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include "base/constants.h"
+#include "renderer/lights/lights.h"
+#include "renderer/sampling/random.h"
+#include "renderer/sampling/sampling.h"
+#include "renderer/surfaces/surface_scene.h"
+#include "tests/tracing/support.h"
+#include "tracing/trace/trace.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+FieldViewSettings view(Conserve conserve, double flexibility) {
+  FieldViewSettings settings;
+  settings.conserve = conserve;
+  settings.flexibility = [flexibility](int, double) { return flexibility; };
+  return settings;
+}
+
+/// A ray that enters the cube [−1, 1]³: positions are uniform on its surface, directions have the density cos θ / π.
+void sample_entry(std::uint64_t index, Vector3d& position, Vector3d& direction) {
+  PathSampler sampler{5, index, 0, 0};
+  const int face = static_cast<int>(6 * sampler.next_1d());
+  const Eigen::Vector2d at = 2 * sampler.next_2d() - Eigen::Vector2d(1, 1);
+  const double side = face % 2 == 0 ? 1 : -1;
+  const int axis = face / 2;
+  position[axis] = side;
+  position[(axis + 1) % 3] = at.x();
+  position[(axis + 2) % 3] = at.y();
+  direction = frame_about(-side * Vector3d::Unit(axis)) * square_to_cosine_hemisphere(sampler.next_2d());
+}
+
+BentRay follow(const FieldRegion& region, const Vector3d& position, const Vector3d& direction) {
+  std::vector<BentRay> ways(1);
+  ways[0].position = position;
+  ways[0].direction = direction;
+  region.trace_radiance(ways);
+  return ways[0];
+}
+
+/// Mean and standard error.
+struct Average {
+  double sum = 0, squares = 0, count = 0;
+  void add(double x) {
+    sum += x;
+    squares += x * x;
+    ++count;
+  }
+  double mean() const { return sum / count; }
+  double error() const { return std::sqrt((squares / count - mean() * mean()) / count); }
+};
+
+TEST(FieldRegionTest, EntersWhereStraightLightMeetsTheBox) {
+  const TensorField field = constant_field(general_tensor());
+  const Geometry geometry(surfaces_of(field));
+  const FieldRegion region(field, geometry, view(Conserve::power, 0.1));
+  EXPECT_NEAR(region.entry({0, 0, 3}, {0, 0, -1}), 2, 1e-12);
+  EXPECT_EQ(region.entry({0, 0, 0}, {0, 0, -1}), 0);
+  EXPECT_EQ(region.entry({0, 0, 3}, {0, 0, 1}), INFINITY);
+  EXPECT_EQ(region.entry({0, 0, 1}, {0, 0, 1}), INFINITY);  // Leaves.
+  EXPECT_EQ(region.entry({2, 0, 3}, {0, 0, -1}), INFINITY);
+}
+
+/// Ways that start on a surface, within the volume and before it, leave it: they do not end where they start.
+TEST(FieldRegionTest, WaysStartOnSurfaces) {
+  const TensorField field = constant_field(general_tensor());
+  for (const double height : {-0.4, -1.0, -1.7}) {
+    const TriangleMesh floor = rectangle_mesh({0, 0, height}, {1, 0, 0}, {0, 1, 0}, {4, 4});
+    const TriangleMesh roof = rectangle_mesh({0, 0, 0.4}, {1, 0, 0}, {0, 1, 0}, {4, 4});
+    Surfaces surfaces = surfaces_of(field);
+    surfaces.obstacles = {floor, roof};
+    const Geometry geometry(std::move(surfaces));
+    const FieldRegion region(field, geometry, view(Conserve::power, 1e-9));
+    std::vector<ShadedSurface> shaded(1);
+    shaded[0].shape = floor;
+    const SurfaceScene stage(std::move(shaded));
+    for (std::uint64_t i = 0; i < 200; ++i) {
+      PathSampler sampler{7, i, 0, 0};
+      const Eigen::Vector2d at = 1.6 * sampler.next_2d() - Eigen::Vector2d(0.8, 0.8);
+      const Vector3d direction = square_to_cosine_hemisphere(sampler.next_2d());
+      const auto hit = stage.intersect({at.x(), at.y(), 0}, {0, 0, -1});
+      const Vector3d start = stage.start(*hit, hit->lifted_position, 1);
+      if (std::isinf(region.entry(start, direction))) continue;
+      const BentRay way = follow(region, start, direction);
+      ASSERT_TRUE(way.arrives);
+      EXPECT_GT(way.position.z(), height + 1e-3) << i;
+      EXPECT_TRUE(!way.on_surface || std::abs(way.position.z() - 0.4) < 1e-5) << i;
+    }
+  }
+}
+
+/// Photons keep their power; radiance is still constant if the symmetric part of T is a multiple of the identity,
+/// however strong light bends.
+TEST(FieldRegionTest, RotationKeepsRadiance) {
+  const TensorField field = cube_field(17, [](const Vector3d& p) {
+    Matrix3d T;
+    T << 0, p.x() - 2, 1, 2 - p.x(), 0, p.y(), -1, -p.y(), 0;
+    return Matrix3d(T + p.z() * Matrix3d::Identity());
+  });
+  const Geometry geometry(surfaces_of(field));
+  const FieldRegion region(field, geometry, view(Conserve::power, 1));
+  for (std::uint64_t i = 0; i < 50; ++i) {
+    Vector3d position, direction;
+    sample_entry(i, position, direction);
+    const BentRay way = follow(region, position, direction);
+    ASSERT_TRUE(way.arrives);
+    EXPECT_NEAR(way.radiance_scale, 1, 1e-5);
+    EXPECT_LT(way.direction.dot(direction), 0.999999);
+  }
+}
+
+TEST(FieldRegionTest, RadianceIsKeptOnRequestInAnyField) {
+  const TensorField field = cube_field(17, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  const FieldRegion region(field, geometry, view(Conserve::radiance, 0.5));
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    Vector3d position, direction;
+    sample_entry(i, position, direction);
+    EXPECT_EQ(follow(region, position, direction).radiance_scale, 1);
+  }
+}
+
+/// L_end / L_start = |M V|³ / det M with M = exp(s ℓ T) for light of constant T; the radiance_scale of the way back is
+/// that of the light that comes along it.
+TEST(FieldRegionTest, ConstantTensorsHaveTheGainOfTheClosedForm) {
+  const double s = 0.4;
+  for (const int voxels : {9, 33}) {
+    const TensorField field = cube_field(voxels, [](const Vector3d&) { return general_tensor(); });
+    const Geometry geometry(surfaces_of(field));
+    for (const Vector3d& direction : {Vector3d(0, 0, 1), Vector3d(0.3, -0.2, 0.9), Vector3d(1, 0.1, 0.1)}) {
+      RayBatch rays;
+      rays.add(-0.99 * direction, direction.normalized(), -s);
+      rays.wants_log_radiance_scale = true;
+      trace(field, geometry, {}, rays);
+      const double change = rays.log_radiance_scale[0];
+      const double length = rays.length[0];
+      // exp(A) by its series of A / 2^20.
+      Matrix3d M = Matrix3d::Identity() + std::ldexp(1, -20) * length * s * general_tensor();
+      for (int i = 0; i < 20; ++i) M = M * M;
+      const Vector3d light = -rays.direction[0];  // Where the light enters the volume.
+      EXPECT_NEAR(std::exp(change), std::pow((M * light).norm(), 3) / M.determinant(), 2e-5)
+          << "single precision in up to 100 steps";
+      EXPECT_GT(std::abs(change), 0.02);
+    }
+  }
+}
+
+/// What leaves a convex boundary fills it once, so that the mean of the radiance_scale is 1.
+TEST(FieldRegionTest, TheMeanGainOverAConvexBoundaryIsOne) {
+  const TensorField field = cube_field(17, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  const FieldRegion region(field, geometry, view(Conserve::power, 0.5));
+  Average radiance_scale;
+  for (std::uint64_t i = 0; i < 60000; ++i) {
+    Vector3d position, direction;
+    sample_entry(i, position, direction);
+    radiance_scale.add(follow(region, position, direction).radiance_scale);
+  }
+  EXPECT_NEAR(radiance_scale.mean(), 1, 5 * radiance_scale.error());
+  EXPECT_LT(radiance_scale.error(), 0.01);
+}
+
+/// Light from a textured Lambertian plate below the field to a sensor above it, once as photons and once as rays that
+/// are followed back from the sensor.
+class Sensor : public ::testing::Test {
+ protected:
+  const double size_ = 4, sensor_size_ = 1.2;
+  TensorField field_ = cube_field(17, linear_tensor);
+  double tilt_ = 0.3;
+
+  Plate plate(double z, double size, double tilt) const {
+    Plate plate;
+    plate.center = {0, 0, z};
+    plate.up = Vector3d(0, std::cos(tilt), std::sin(tilt));
+    plate.size = {size, size};
+    return plate;
+  }
+
+  static double radiance(const Vector3d& point) { return 1 + std::sin(2 * point.x()) * std::cos(point.y()); }
+
+  static bool is_on(const Plate& plate, const Vector3d& point) {
+    const Eigen::Array2d at = plate.to_pixel(point).array();
+    return (at > 0).all() && (at < plate.resolution.cast<double>().array()).all();
+  }
+
+  /// A point of the plate and a direction on the side of its normal, with the density cos θ / π.
+  static void start(const Plate& plate, double side, std::uint64_t index, Vector3d& point, Vector3d& direction) {
+    PathSampler sampler{7, index, 0, 0};
+    point = plate.to_world(sampler.next_2d().cwiseProduct(plate.resolution.cast<double>()));
+    direction = frame_about(side * plate.normal()) * square_to_cosine_hemisphere(sampler.next_2d());
+  }
+
+  /// Flux on the sensor by photons.
+  Average forwards(double s, int photons = 300000) const {
+    const Plate emitter = plate(-1.5, size_, 0), sensor = plate(1.4, sensor_size_, tilt_);
+    Surfaces surfaces = surfaces_of(field_);
+    surfaces.plate = sensor;
+    const Geometry geometry(std::move(surfaces));
+    Average flux;
+    for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(photons); ++i) {
+      Vector3d point, direction;
+      start(emitter, 1, i, point, direction);
+      RayBatch rays;
+      rays.add(point, direction, s);
+      trace(field_, geometry, {}, rays);
+      // The sensor sees one side.
+      const bool arrives = rays.end[0] == RayEnd::plate && rays.direction[0].dot(sensor.normal()) > 0;
+      flux.add(arrives ? pi * size_ * size_ * radiance(point) : 0);
+    }
+    return flux;
+  }
+
+  /// The same, followed back. @param s  Of the light; the region takes −s.
+  Average backwards(double s, Conserve conserve, int rays = 100000) const {
+    const Plate emitter = plate(-1.5, size_, 0), sensor = plate(1.4, sensor_size_, tilt_);
+    const Geometry geometry(surfaces_of(field_));
+    const FieldRegion region(field_, geometry, view(conserve, s));
+    Average flux;
+    for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(rays); ++i) {
+      BentRay way;
+      start(sensor, -1, i, way.position, way.direction);
+      if (region.entry(way.position, way.direction) < INFINITY) way = follow(region, way.position, way.direction);
+      const double distance = (emitter.center.z() - way.position.z()) / way.direction.z();
+      const Vector3d hit = way.position + distance * way.direction;
+      const bool arrives = way.direction.z() < 0 && is_on(emitter, hit);
+      flux.add(arrives ? pi * sensor_size_ * sensor_size_ * way.radiance_scale * radiance(hit) : 0);
+    }
+    return flux;
+  }
+};
+
+TEST_F(Sensor, SeesTheSameForwardsAndBackwards) {
+  const double s = 0.35;
+  const Average photons = forwards(s), rays = backwards(s, Conserve::power);
+  const double error = std::hypot(photons.error(), rays.error());
+  EXPECT_NEAR(photons.mean(), rays.mean(), 4 * error);
+  EXPECT_LT(error, 0.02 * rays.mean());
+  // The test can fail: with the wrong sign of s, and without the radiance_scale.
+  EXPECT_GT(std::abs(photons.mean() - backwards(-s, Conserve::power).mean()), 6 * error);
+  EXPECT_GT(std::abs(photons.mean() - backwards(s, Conserve::radiance).mean()), 6 * error);
+}
+
+/// Random linear fields of general tensors, sensors and flexibilities of both signs.
+TEST_F(Sensor, SeesTheSameForwardsAndBackwardsInRandomScenes) {
+  double squares = 0, wrong_squares = 0;
+  constexpr int scenes = 6;
+  for (std::uint64_t scene = 0; scene < scenes; ++scene) {
+    std::array<Matrix3d, 4> T;
+    for (std::uint32_t i = 0; i < 36; ++i) T[i / 9](i % 9) = 2 * random_uniform(11, scene, i) - 1;
+    field_ = cube_field(
+        9, [&](const Vector3d& p) { return Matrix3d(T[0] + 0.5 * (p.x() * T[1] + p.y() * T[2] + p.z() * T[3])); });
+    tilt_ = 0.8 * random_uniform(11, scene, 36) - 0.4;
+    const double s = (scene % 2 == 0 ? 1 : -1) * (0.2 + 0.2 * random_uniform(11, scene, 37));
+    const Average photons = forwards(s, 120000), rays = backwards(s, Conserve::power, 40000);
+    const Average wrong = backwards(-s, Conserve::power, 40000);
+    squares += std::pow((photons.mean() - rays.mean()) / std::hypot(photons.error(), rays.error()), 2);
+    wrong_squares += std::pow((photons.mean() - wrong.mean()) / std::hypot(photons.error(), wrong.error()), 2);
+  }
+  // The sum of `scenes` squares of standard normal numbers is above 28 once in 10,000 times.
+  EXPECT_LT(squares, 28);
+  EXPECT_GT(wrong_squares, 100);  // The test can fail.
+}
+
+}  // namespace
+}  // namespace tensorray

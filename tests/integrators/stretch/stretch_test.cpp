@@ -1,0 +1,226 @@
+// Compares the stretch of bundles of light with closed forms and with neighbouring rays.
+
+#include "integrators/stretch/stretch.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "base/constants.h"
+#include "tests/tracing/support.h"
+#include "tracing/trace/trace.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+StretchSettings along_minus_z(double length, double flexibility = 1) {
+  StretchSettings settings;
+  settings.flexibility = flexibility;
+  settings.length = length;
+  return settings;
+}
+
+/// The stretch of one start.
+double stretch_at(const TensorField& field, const StretchSettings& settings, const Vector3d& start, double step = 0.125,
+                  Surfaces extra = {}) {
+  extra.bounds = surfaces_of(field).bounds;
+  return stretches(field, Geometry(std::move(extra)), settings_of(BendingMethod::splitting, step), settings,
+                   {start})[0];
+}
+
+TEST(Stretch, OfStraightLightIsZero) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  for (const Vector3d& start : {Vector3d(0, 0, 0), Vector3d(0.4, -0.9, 0.7), Vector3d(0.1, 0.2, 3)})
+    EXPECT_NEAR(stretch_at(field, along_minus_z(5), start), 0, 1e-7);
+}
+
+/// All light turns alike everywhere: the distances between neighbours do not change.
+TEST(Stretch, OfRotationIsZero) {
+  Matrix3d rotation;
+  rotation << 0, -0.4, 0.7, 0.4, 0, 0.9, -0.7, -0.9, 0;
+  const TensorField field = constant_field(rotation);
+  for (const Vector3d& start : {Vector3d(0, 0, 0.4), Vector3d(-0.2, 0.1, 0.2)})
+    EXPECT_NEAR(stretch_at(field, along_minus_z(0.7), start), 0, 1e-7);
+}
+
+/// T_xz = −c x: light along −z obeys x'' = s c x near x = 0, so that a distance grows as cosh(√(s c) L) if c > 0, and
+/// oscillates if c < 0. A distance along y does not change.
+Matrix3d lens_tensor(const Vector3d& p, double c) {
+  Matrix3d T = Matrix3d::Zero();
+  T(0, 2) = -c * p.x();
+  return T;
+}
+
+TEST(Stretch, OfADivergingFieldIsThatOfTheHyperbolicCosine) {
+  const TensorField field = cube_field(17, [](const Vector3d& p) { return lens_tensor(p, 6); });
+  for (const double length : {0.3, 0.9, 1.6}) {
+    const double expected = std::log(std::cosh(std::sqrt(0.5 * 6) * length)) / length;
+    // The relative error of splitting is a fraction of (√3 h)²/12, h = 1/64.
+    EXPECT_NEAR(stretch_at(field, along_minus_z(length, 0.5), {0, 0.2, 0.9}), expected, 2e-4 * expected) << length;
+  }
+}
+
+TEST(Stretch, OfAConvergingFieldIsZeroAcrossIt) {
+  const TensorField field = cube_field(17, [](const Vector3d& p) { return lens_tensor(p, -6); });
+  for (const double length : {0.5, 1.6})
+    EXPECT_NEAR(stretch_at(field, along_minus_z(length, 0.5), {0, 0.2, 0.9}), 0, 1e-6);
+}
+
+/// Behind the volume, distances grow with the difference of directions: cosh k d + k (L − d) sinh k d.
+TEST(Stretch, GoesOnBehindTheVolume) {
+  const TensorField field = cube_field(17, [](const Vector3d& p) { return lens_tensor(p, 6); });
+  const double k = std::sqrt(0.5 * 6), depth = 2, length = 5;
+  // From the face where light enters, and from half a unit before it.
+  for (const double before : {0.0, 0.5}) {
+    const double behind = length - depth - before;
+    const double expected = std::log(std::cosh(k * depth) + k * behind * std::sinh(k * depth)) / length;
+    EXPECT_NEAR(stretch_at(field, along_minus_z(length, 0.5), {0, 0.2, 1 + before}), expected, 2e-4 * expected);
+  }
+}
+
+/// The stretch is the greatest distance that a circle of neighbours reaches at equal lengths. Many rays leave at a
+/// slant, through another face than the one through which they entered.
+TEST(Stretch, IsThatOfNeighbouringRaysAtEqualLengths) {
+  const TensorField field = cube_field(17, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  BendingSettings bending = settings_of(BendingMethod::rk4, 0.03125);
+  StretchSettings settings = along_minus_z(0, 0.7);
+  settings.direction = Vector3d(0.3, -0.2, -1).normalized();
+  const Vector3d u = settings.direction.unitOrthogonal(), v = settings.direction.cross(u);
+  constexpr double radius = 1e-5;
+  for (const Vector3d& start : {Vector3d(0.1, 0.3, 0.2), Vector3d(-0.5, 0.4, 2), Vector3d(0.3, 0.3, 0.9)})
+    for (const double length : {0.4, 1.3, 4.0}) {
+      settings.length = bending.max_length = length;
+      const auto end_of = [&](const Vector3d& from) {
+        const Ray ray = trace_one(field, geometry, bending, from, settings.direction, settings.flexibility);
+        EXPECT_EQ(ray.end, RayEnd::missed);
+        return ray.position;
+      };
+      double greatest = 0;
+      for (int i = 0; i < 64; ++i) {
+        const double angle = i * pi / 64;
+        const Vector3d offset = radius * (std::cos(angle) * u + std::sin(angle) * v);
+        greatest = std::max(greatest, (end_of(start + offset) - end_of(start - offset)).norm() / (2 * radius));
+      }
+      if (start.z() == 2 && length < 1) continue;  // Not yet in the volume.
+      const double value = stretches(field, geometry, bending, settings, {start})[0];
+      // The greatest of 64 directions is too small by at most 1 − cos(π/128) = 3e-4.
+      EXPECT_NEAR(value * length, std::log(greatest), 1e-3) << start.transpose() << ", " << length;
+    }
+}
+
+TEST(Stretch, IsNoneWhereLightDoesNotComeSoFar) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  Surfaces obstacle;
+  obstacle.obstacles.push_back(
+      box_mesh(Eigen::AlignedBox3d(Vector3d(-0.3, -0.3, -0.3), Vector3d(0.3, 0.3, 0)), Eigen::Affine3d::Identity()));
+  EXPECT_TRUE(std::isnan(stretch_at(field, along_minus_z(1), {0, 0, 0.9}, 0.5, obstacle)));
+  EXPECT_NEAR(stretch_at(field, along_minus_z(0.8), {0, 0, 0.9}, 0.5, obstacle), 0, 1e-7);
+  EXPECT_TRUE(std::isnan(stretch_at(field, along_minus_z(0.8), {0, 0, -0.1}, 0.5, obstacle))) << "in the obstacle";
+  EXPECT_TRUE(std::isnan(stretch_at(field, along_minus_z(9), {3, 0, 2}, 0.5))) << "beside the volume";
+}
+
+TEST(Stretch, GridIsALatticeInTheVolume) {
+  Eigen::Affine3d placement = Eigen::Affine3d::Identity();
+  placement.translation() = Vector3d(3, 4, 5);
+  const TensorField field(cube_grid(
+      {9, 17, 5}, [](const Vector3d& p) { return lens_tensor(p - Vector3d(3, 4, 5), 6); }, placement));
+  const Geometry geometry(surfaces_of(field));
+  const ScalarGrid grid = stretch_grid(field, geometry, {}, along_minus_z(0.5), 33, Progress());
+  std::size_t voxels = 0;
+  for (const ScalarBlock& block : grid.blocks) {
+    voxels += block.active.count();
+    for (const int offset : {0, 100, 511}) {
+      if (!block.active[offset]) continue;
+      const Vector3i voxel = block.origin + TensorBlock::position(offset);
+      const Vector3d start = grid.to_world * voxel.cast<double>();
+      EXPECT_EQ(block.values[offset], stretches(field, geometry, {}, along_minus_z(0.5), {start})[0]);
+    }
+  }
+  EXPECT_EQ(voxels, 17u * 33u * 9u);
+  EXPECT_NEAR((grid.to_world * Vector3d(16, 32, 8) - Vector3d(4, 5, 6)).norm(), 0, 1e-12);
+  EXPECT_NEAR((grid.to_world * Vector3d(0, 0, 0) - Vector3d(2, 3, 4)).norm(), 0, 1e-12);
+}
+
+TEST(Stretch, PictureIsOfThePixelsMiddles) {
+  const TensorField field = cube_field(9, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  Plate pixels = plate_across({0, 0, -1}, -1.25);
+  pixels.size = {3, 1.5};
+  pixels.resolution = {12, 6};
+  const std::vector<float> picture = stretch_picture(field, geometry, {}, along_minus_z(2), pixels, Progress());
+  ASSERT_EQ(picture.size(), 72u);
+  for (int y = 0; y < 6; ++y)
+    for (int x = 0; x < 12; ++x) {
+      const Vector3d start = pixels.to_world({x + 0.5, y + 0.5});
+      EXPECT_NEAR(start.z(), 1.25, 1e-12);
+      const float value = picture[static_cast<std::size_t>(12 * y + x)];
+      EXPECT_EQ(std::isnan(value), std::abs(start.x()) > 1);
+      if (!std::isnan(value)) {
+        EXPECT_EQ(value, stretches(field, geometry, {}, along_minus_z(2), {start})[0]);
+      }
+    }
+}
+
+TEST(Stretch, IsTheSameOnAnyNumberOfThreads) {
+  const TensorField field = cube_field(9, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  const auto on_threads = [&](int threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return stretch_grid(field, geometry, {}, along_minus_z(1), 20, Progress());
+  };
+  const ScalarGrid one = on_threads(1), many = on_threads(4);
+  ASSERT_EQ(one.blocks.size(), many.blocks.size());
+  for (std::size_t i = 0; i < one.blocks.size(); ++i) EXPECT_EQ(one.blocks[i].values, many.blocks[i].values);
+}
+
+TEST(Stretch, RefusesSettingsOutOfRangeAndStopsWhenCancelled) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  const Geometry geometry(surfaces_of(field));
+  Progress progress;
+  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(0), 9, progress), std::invalid_argument);
+  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(-1), 9, progress), std::invalid_argument);
+  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(INFINITY), 9, progress), std::invalid_argument);
+  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(1), 1, progress), std::invalid_argument);
+  progress.cancelled = true;
+  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(1), 9, progress), Cancelled);
+}
+
+/// The greatest length ends rays before the volume, in it and behind it, but not behind a surface that they meet.
+TEST(GreatestLength, EndsRaysWhereverTheyAre) {
+  const TensorField field = cube_field(9, linear_tensor);
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate_across({0, 0, -1}, 3);
+  const Geometry geometry(surfaces);
+  for (const BendingMethod method : {BendingMethod::euler, BendingMethod::splitting, BendingMethod::dopri5})
+    for (const double length : {0.5, 1.7, 4.2}) {
+      BendingSettings settings = settings_of(method, 0.3);
+      settings.max_length = length;
+      RayBatch batch;
+      batch.add({0.1, 0.2, 2}, {0, 0, -1}, 0.1);
+      std::vector<RayRecord> records;
+      trace(field, geometry, settings, batch, &records);
+      EXPECT_EQ(batch.end[0], RayEnd::missed);
+      EXPECT_NEAR(batch.length[0], length, 1e-12);
+      const PathPoint last = path_point(field, records[0], records[0].size() - 1);
+      EXPECT_EQ(last.length, batch.length[0]);
+      EXPECT_EQ(last.position, batch.position[0]);
+    }
+  BendingSettings settings;
+  settings.max_length = 9;
+  RayBatch batch;
+  batch.add({0.1, 0.2, 2}, {0, 0, -1}, 0.1);
+  trace(field, geometry, settings, batch);
+  EXPECT_EQ(batch.end[0], RayEnd::plate);
+  settings.max_length = 0;
+  EXPECT_THROW(trace(field, geometry, settings, batch), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,443 @@
+#include "tracing/bending/bending.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <unsupported/Eigen/MatrixFunctions>
+
+#include "tests/tracing/support.h"
+#include "tracing/trace/trace.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr BendingMethod all_methods[] = {BendingMethod::euler, BendingMethod::splitting, BendingMethod::rk4,
+                                         BendingMethod::bs23, BendingMethod::dopri5};
+
+Matrix3d rotation_about(const Vector3d& axis) {
+  Matrix3d T;
+  T << 0, -axis.z(), axis.y(), axis.z(), 0, -axis.x(), -axis.y(), axis.x(), 0;
+  return T;
+}
+
+/// V(t) = normalize(exp(s T t) V₀), and P(t) by composite Gauss–Legendre quadrature: the exact path for constant T.
+Ray exact_path(const Matrix3d& T, double s, const Vector3d& P, const Vector3d& V, double t) {
+  const auto direction = [&](double at) -> Vector3d { return (Matrix3d((s * at * T).exp()) * V).normalized(); };
+  const double nodes[3] = {-std::sqrt(0.6), 0, std::sqrt(0.6)}, weights[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+  Vector3d position = P;
+  constexpr int pieces = 400;
+  for (int i = 0; i < pieces; ++i)
+    for (int k = 0; k < 3; ++k) position += t / pieces * weights[k] * direction((i + 0.5 + nodes[k] / 2) * t / pieces);
+  return {position, direction(t)};
+}
+
+std::vector<Matrix3d> constant_tensors() {
+  const Matrix3d general = general_tensor();
+  Matrix3d shear = Matrix3d::Zero();
+  shear(0, 2) = 2;
+  return {Vector3d(1.5, -0.75, 0.25).asDiagonal().toDenseMatrix(), general + general.transpose(), general,
+          rotation_about({1, -2, 0.5}), shear};
+}
+
+TEST(Bending, ZeroAndIsotropicFieldsLeaveLightStraight) {
+  for (const double c : {0.0, 3.0}) {
+    const TensorField field = constant_field(c * Matrix3d::Identity());
+    Surfaces surfaces = surfaces_of(field);
+    surfaces.plate = plate_across({0, 0, -1}, 2);
+    const Geometry geometry(std::move(surfaces));
+    for (const BendingMethod method : all_methods) {
+      const Vector3d V = Vector3d(0.1, -0.2, -1).normalized();
+      const Ray ray = trace_one(field, geometry, settings_of(method, 0), {0.3, 0.1, 3}, V, 0.3);
+      EXPECT_EQ(ray.end, RayEnd::plate);
+      EXPECT_LT((ray.position - (Vector3d(0.3, 0.1, 3) + 5 / -V.z() * V)).norm(), 1e-12);
+      EXPECT_LT((ray.direction - V).norm(), 1e-14);
+    }
+  }
+}
+
+TEST(Bending, SplittingIsExactInDirectionForConstantTensorsAtAnyStep) {
+  const Vector3d P(-0.2, 0.1, 0.3), V = Vector3d(0.3, -0.4, 1).normalized();
+  for (const Matrix3d& T : constant_tensors())
+    for (const double step : {0.1, 0.5, 2.0}) {
+      const TensorField field = constant_field(T);
+      const double h = step * voxel_size(field);
+      const Ray ray = trace_steps(field, settings_of(BendingMethod::splitting, step), 1, P, V, 0.8);
+      EXPECT_LT((ray.direction - exact_path(T, 0.8, P, V, h).direction).norm(), 2e-12) << T << "\nstep " << step;
+    }
+}
+
+TEST(Bending, AllMethodsFollowTheExactPathOfConstantTensors) {
+  const Vector3d P(-0.2, 0.1, -0.5), V = Vector3d(0.3, -0.4, 1).normalized();
+  for (const Matrix3d& T : constant_tensors()) {
+    const TensorField field = constant_field(T);
+    const int steps = 64;
+    const double step = 1.0 / 16, t = steps * step * voxel_size(field);
+    const Ray exact = exact_path(T, 0.5, P, V, t);
+    const auto error = [&](BendingMethod method) {
+      const Ray ray = trace_steps(field, settings_of(method, step), steps, P, V, 0.5);
+      return (ray.position - exact.position).norm() + (ray.direction - exact.direction).norm();
+    };
+    // ‖s T h‖ is about 0.02. The error is that value to the power of the order, times the path's length and a constant.
+    EXPECT_LT(error(BendingMethod::euler), 0.04);
+    EXPECT_LT(error(BendingMethod::splitting), 4e-4);
+    EXPECT_LT(error(BendingMethod::rk4), 1e-7);
+  }
+}
+
+/// Λ of light of constant T: L_end / L_start = |M V₀|³ / det M with M = exp(s ℓ T), and −Λ is its logarithm.
+TEST(Bending, RadianceOfConstantTensorsChangesAsInTheClosedForm) {
+  const Vector3d P(-0.2, 0.1, -0.5), V = Vector3d(0.3, -0.4, 1).normalized();
+  const double s = 0.5;
+  for (const Matrix3d& T : constant_tensors()) {
+    const TensorField field = constant_field(T);
+    const Geometry geometry(surfaces_of(field));
+    const auto error = [&](BendingMethod method, double step) {
+      BendingSettings settings = settings_of(method, step);
+      settings.max_steps = static_cast<int>(4 / step);
+      RayBatch rays;
+      rays.wants_log_radiance_scale = true;
+      rays.add(P, V, s);
+      trace_reference(field, geometry, settings, rays);
+      EXPECT_EQ(rays.end[0], RayEnd::step_limit);
+      const Matrix3d M = Matrix3d(s * rays.length[0] * T).exp();
+      return std::abs(rays.log_radiance_scale[0] + std::log(std::pow((M * V).norm(), 3) / M.determinant()));
+    };
+    EXPECT_LT(error(BendingMethod::splitting, 1), 1e-11) << "every step is exact";
+    // ‖s T h‖ is about 0.02, and Λ at most 1: as in the test above.
+    EXPECT_LT(error(BendingMethod::euler, 1.0 / 16), 0.04);
+    EXPECT_LT(error(BendingMethod::rk4, 1.0 / 16), 1e-7);
+  }
+}
+
+TEST(Bending, AddingAnIsotropicTensorChangesNoPath) {
+  const TensorField field = cube_field(9, linear_tensor);
+  const TensorField shifted =
+      cube_field(9, [](const Vector3d& p) { return Matrix3d(linear_tensor(p) + 4 * Matrix3d::Identity()); });
+  // Not `euler`, which normalises only after the step, as in the paper.
+  for (const BendingMethod method :
+       {BendingMethod::splitting, BendingMethod::rk4, BendingMethod::bs23, BendingMethod::dopri5}) {
+    const auto path = [&](const TensorField& of) {
+      BendingSettings settings = settings_of(method, 0);
+      settings.tolerance = 1e-6;
+      Surfaces surfaces = surfaces_of(of);
+      surfaces.plate = plate_across({0, 0, -1}, 1.5);
+      return trace_one(of, Geometry(std::move(surfaces)), settings, {0.2, -0.1, 2}, {0, 0, -1}, 0.4);
+    };
+    EXPECT_LT((path(field).position - path(shifted).position).norm(), 1e-12);
+  }
+}
+
+TEST(Bending, PathsAreRetracedWithTheOppositeSign) {
+  const TensorField field = cube_field(9, linear_tensor);
+  const Vector3d P(-0.3, 0.2, -0.6), V = Vector3d(0.1, 0.2, 1).normalized();
+  const auto there_and_back = [&](BendingMethod method, double back) {
+    const BendingSettings settings = settings_of(method, 0.25);
+    const Ray there = trace_steps(field, settings, 16, P, V, 0.5);
+    return (trace_steps(field, settings, 16, there.position, -there.direction, back).position - P).norm();
+  };
+  EXPECT_LT(there_and_back(BendingMethod::splitting, -0.5), 1e-10);  // Symmetric in time: exact but for rounding.
+  EXPECT_LT(there_and_back(BendingMethod::rk4, -0.5), 1e-6);
+  EXPECT_GT(there_and_back(BendingMethod::splitting, 0.5), 0.05);
+}
+
+TEST(Bending, TheScaleIsAFactorOnTheFlexibility) {
+  const TensorField field = cube_field(9, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  const TensorField strong = cube_field(9, [](const Vector3d& p) { return Matrix3d(8 * linear_tensor(p)); });
+  for (const BendingMethod method : all_methods)
+    for (const double step : {0.0, 0.25}) {  // Automatic steps follow the scale.
+      BendingSettings scaled = settings_of(method, step), plain = scaled;
+      scaled.scale = 8;
+      const Vector3d P(0.1, 0.2, -2), V(0, 0.1, 1);
+      const Ray ray = trace_one(field, geometry, scaled, P, V, 0.4);
+      for (const Ray& same :
+           {trace_one(field, geometry, plain, P, V, 3.2), trace_one(strong, geometry, plain, P, V, 0.4)}) {
+        EXPECT_EQ(ray.position, same.position);
+        EXPECT_EQ(ray.direction, same.direction);
+        EXPECT_EQ(ray.steps, same.steps);
+      }
+      scaled.scale = -2.9;
+      const Ray other = trace_one(field, geometry, scaled, P, V, 0.4);
+      EXPECT_LT((other.position - trace_one(field, geometry, plain, P, V, 0.4 * -2.9).position).norm(), 1e-12);
+      EXPECT_GT((other.position - ray.position).norm(), 0.1);
+    }
+}
+
+TEST(Bending, RotatingEverythingRotatesThePath) {
+  Eigen::Affine3d turn = Eigen::Affine3d::Identity();
+  turn.linear() = Eigen::AngleAxisd(0.7, Vector3d(1, -2, 3).normalized()).toRotationMatrix();
+  turn.translation() = Vector3d(5, -3, 2);
+  const Matrix3d R = turn.linear();
+  const TensorField field = cube_field(9, linear_tensor);
+  const TensorField turned = cube_field(
+      9, [&](const Vector3d& p) { return Matrix3d(R * linear_tensor(turn.inverse() * p) * R.transpose()); }, turn);
+  const auto land = [](const TensorField& of, const Eigen::Affine3d& placement) {
+    Surfaces surfaces = surfaces_of(of);
+    surfaces.plate = plate_across({0, 0, -1}, 1.5);
+    surfaces.plate->center = placement * surfaces.plate->center;
+    surfaces.plate->right = placement.linear() * surfaces.plate->right;
+    surfaces.plate->up = placement.linear() * surfaces.plate->up;
+    return trace_one(of, Geometry(std::move(surfaces)), {}, placement * Vector3d(0.2, -0.1, 2),
+                     placement.linear() * Vector3d(0, 0, -1), 0.4);
+  };
+  const Ray straight = land(field, Eigen::Affine3d::Identity()), rotated = land(turned, turn);
+  ASSERT_EQ(straight.end, RayEnd::plate);
+  // The rotated tensors are rounded to single precision.
+  EXPECT_LT((turn * straight.position - rotated.position).norm(), 1e-6);
+  EXPECT_LT((R * straight.direction - rotated.direction).norm(), 1e-6);
+}
+
+TEST(Bending, LinearFieldsGiveOnePathOnAnyGrid) {
+  // Trilinear interpolation is exact for these fields, whatever the shape of the voxels.
+  const auto land = [](const TensorField& field) {
+    BendingSettings settings = settings_of(BendingMethod::dopri5, 0);
+    settings.tolerance = 1e-10;
+    Surfaces surfaces = surfaces_of(field);
+    surfaces.plate = plate_across({0, 0, -1}, 1.5);
+    return trace_one(field, Geometry(std::move(surfaces)), settings, {0.2, -0.1, 2}, {0, 0, -1}, 0.4);
+  };
+  const Ray cubes = land(cube_field(9, linear_tensor));
+  const Ray bricks = land(TensorField(cube_grid({5, 17, 33}, linear_tensor)));
+  EXPECT_LT((cubes.position - bricks.position).norm(), 1e-8);
+}
+
+TEST(Bending, StrongFlexibilityFollowsTheMajorEigenvector) {
+  // A symmetric positive field whose major eigenvector turns slowly with z.
+  const auto major = [](double z) { return Vector3d(std::sin(0.4 * z), 0, std::cos(0.4 * z)); };
+  const TensorField field = cube_field(65, [&](const Vector3d& p) {
+    const Vector3d e = major(p.z());
+    return Matrix3d(Matrix3d::Identity() + 4 * e * e.transpose());
+  });
+  const Ray ray = trace_steps(field, settings_of(BendingMethod::splitting, 0.125), 320, {-0.1, 0.1, -0.7},
+                              Vector3d(1, 1, 1).normalized(), 300);
+  EXPECT_LT(ray.direction.cross(major(ray.position.z())).norm(), 2e-3);  // The direction lags by 0.4/(s (5 − 1)).
+  // The streamline of e: x(z) has the slope tan 0.4 z.
+  const double expected = -0.1 - (std::log(std::cos(0.4 * ray.position.z())) - std::log(std::cos(0.4 * 0.7))) / 0.4;
+  EXPECT_NEAR(ray.position.x(), expected, 4e-3);
+}
+
+TEST(Bending, HugeStepsStayStable) {
+  const TensorField field = cube_field(9, linear_tensor);
+  for (const double s : {1e2, 1e4, 1e8}) {
+    const Ray ray = trace_one(field, Geometry(surfaces_of(field)), settings_of(BendingMethod::splitting, 0.5),
+                              {0.2, -0.1, 2}, {0, 0, -1}, s);
+    EXPECT_NE(ray.end, RayEnd::degenerate);
+    EXPECT_NEAR(ray.direction.norm(), 1, 1e-12);
+  }
+}
+
+/// The slope of log(error) over log(step).
+double observed_order(const std::vector<double>& errors) {
+  return std::log2(errors.front() / errors.back()) / static_cast<double>(errors.size() - 1);
+}
+
+std::vector<double> errors_of(const TensorField& field, BendingMethod method, int coarsest, int refinements) {
+  const Vector3d P(-0.35, 0.25, -0.6), V = Vector3d(0.15, 0.2, 1).normalized();
+  const double length = 4;  // In voxels.
+  const auto end = [&](BendingMethod by, int steps) {
+    return trace_steps(field, settings_of(by, length / steps), steps, P, V, 0.6).position;
+  };
+  const Vector3d exact = end(BendingMethod::rk4, 1 << 14);
+  std::vector<double> errors;
+  for (int i = 0; i < refinements; ++i) errors.push_back((end(method, coarsest << i) - exact).norm());
+  return errors;
+}
+
+TEST(Bending, OrderOfConvergence) {
+  const TensorField smooth = cube_field(9, linear_tensor);
+  EXPECT_NEAR(observed_order(errors_of(smooth, BendingMethod::euler, 64, 4)), 1, 0.1);
+  EXPECT_NEAR(observed_order(errors_of(smooth, BendingMethod::splitting, 16, 4)), 2, 0.1);
+  EXPECT_NEAR(observed_order(errors_of(smooth, BendingMethod::rk4, 4, 4)), 4, 0.3);
+
+  // Trilinear data have kinks at the faces of cells, which limit every method to order 2.
+  const TensorField kinked = cube_field(9, [](const Vector3d& p) {
+    return Matrix3d(linear_tensor(p) * (1 + std::sin(7 * p.x() + 5 * p.y() + 9 * p.z())));
+  });
+  EXPECT_NEAR(observed_order(errors_of(kinked, BendingMethod::splitting, 16, 6)), 2, 0.4);
+  EXPECT_NEAR(observed_order(errors_of(kinked, BendingMethod::rk4, 16, 6)), 2, 0.7);
+}
+
+TEST(Bending, EntryExitAndPlateKeepTheOrder) {
+  const TensorField field = cube_field(9, linear_tensor);
+  for (const double plate_at : {1.5, 0.37}) {  // Behind the volume, and inside.
+    Surfaces surfaces = surfaces_of(field);
+    surfaces.plate = plate_across(Vector3d(0.1, 0.2, -1), plate_at);
+    const Geometry geometry(std::move(surfaces));
+    const auto land = [&](BendingMethod method, double step) {
+      const Ray ray = trace_one(field, geometry, settings_of(method, step), {0.2, -0.1, 2}, {0, 0, -1}, 0.5);
+      EXPECT_EQ(ray.end, RayEnd::plate);
+      return ray.position;
+    };
+    const Vector3d exact = land(BendingMethod::rk4, 1.0 / 256);
+    const auto order = [&](BendingMethod method, double step) {
+      return std::log2((land(method, step) - exact).norm() / (land(method, step / 8) - exact).norm()) / 3;
+    };
+    EXPECT_NEAR(order(BendingMethod::euler, 0.25), 1, 0.15);
+    EXPECT_NEAR(order(BendingMethod::splitting, 0.5), 2, 0.15);
+    EXPECT_NEAR(order(BendingMethod::rk4, 1), 4, 0.5);
+  }
+}
+
+TEST(Bending, AdaptiveMethodsKeepTheirTolerance) {
+  const TensorField field = cube_field(17, linear_tensor);
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate_across({0, 0, -1}, 1.5);
+  const Geometry geometry(std::move(surfaces));
+  const auto land = [&](BendingMethod method, double tolerance) {
+    BendingSettings settings = settings_of(method, 0);
+    settings.tolerance = tolerance;
+    return trace_one(field, geometry, settings, {0.2, -0.1, 2}, {0, 0, -1}, 2.0);
+  };
+  const Vector3d exact = land(BendingMethod::dopri5, 1e-12).position;
+  for (const BendingMethod method : {BendingMethod::bs23, BendingMethod::dopri5}) {
+    double last = 1;
+    for (const double tolerance : {1e-3, 1e-5, 1e-7}) {
+      const Ray ray = land(method, tolerance);
+      const double error = (ray.position - exact).norm() / voxel_size(field);
+      // The error of each step is `tolerance` voxels and radians, and the plate is about 20 voxels from the first step.
+      EXPECT_LT(error, (1 + 20) * tolerance * ray.steps);
+      EXPECT_LT(error, last);
+      last = error;
+    }
+  }
+  EXPECT_LT(land(BendingMethod::dopri5, 1e-7).steps, land(BendingMethod::bs23, 1e-7).steps);
+}
+
+TEST(Bending, AThinVoxelAcrossTheRayDoesNotShortenItsSteps) {
+  // Not zero, because a brick of zeros is crossed in one step.
+  const auto weak = [](const Vector3d&) { return Matrix3d(1e-9 * general_tensor()); };
+  const TensorField flat(cube_grid({9, 9, 4001}, weak));
+  const auto steps = [&](const Vector3d& direction) {
+    return trace_one(flat, Geometry(surfaces_of(flat)), {}, -2 * direction, direction, 0.3).steps;
+  };
+  EXPECT_EQ(steps({1, 0, 0}), 17u);
+  EXPECT_NEAR(steps({0, 0, 1}), 8000, 1);
+}
+
+TEST(Bending, AutomaticStepsShortenWhereTheFieldIsStrong) {
+  const TensorField weak = constant_field(0.01 * general_tensor()), strong = constant_field(20 * general_tensor());
+  const auto steps = [](const TensorField& field) {
+    return trace_one(field, Geometry(surfaces_of(field)), {}, {0, 0, 2}, {0, 0, -1}, 0.5).steps;
+  };
+  EXPECT_EQ(steps(weak), 17u);  // 8 voxels in half steps, and the step that finds the face.
+  EXPECT_GT(steps(strong), 40u);
+}
+
+TEST(Bending, EveryEndIsToldApart) {
+  const TensorField field = constant_field(general_tensor());
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate_across({0, 0, -1}, 3);
+  surfaces.plate->size = {1, 1};
+  surfaces.obstacles.push_back(box_mesh(Eigen::AlignedBox3d(Vector3d(-0.9, -0.9, -0.9), Vector3d(-0.6, -0.6, -0.6)),
+                                        Eigen::Affine3d::Identity()));
+  const Geometry geometry(std::move(surfaces));
+  const auto end = [&](const Vector3d& from, double s, BendingSettings settings = {}) {
+    return trace_one(field, geometry, settings, from, {0, 0, -1}, s).end;
+  };
+  EXPECT_EQ(end({0, 0, 2}, 0), RayEnd::plate);
+  EXPECT_EQ(end({0.9, 0, 2}, 0), RayEnd::missed);
+  EXPECT_EQ(end({3, 0, 2}, 0), RayEnd::missed);
+  EXPECT_EQ(end({-0.75, -0.75, 2}, 0), RayEnd::obstacle);  // Inside the volume.
+  BendingSettings few;
+  few.max_steps = 3;
+  EXPECT_EQ(end({0, 0, 2}, 0, few), RayEnd::step_limit);
+  EXPECT_EQ(end({0, 0, 2}, std::nan("")), RayEnd::degenerate);
+  EXPECT_EQ(end({0, 0, 2}, 1e308), RayEnd::degenerate);
+}
+
+TEST(Bending, EulerEndsWhereTheFieldAnnihilatesTheDirection) {
+  const TensorField field = constant_field(-Matrix3d::Identity());
+  const BendingSettings settings = settings_of(BendingMethod::euler, 0.5);
+  const double s = 1 / (0.5 * voxel_size(field));  // V + s h T V = 0.
+  EXPECT_EQ(trace_one(field, Geometry(surfaces_of(field)), settings, {0, 0, 2}, {0, 0, -1}, s).end, RayEnd::degenerate);
+}
+
+TEST(Bending, ACutActsAsASmallerVolume) {
+  const Eigen::AlignedBox3d inner(Vector3d(-0.5, -0.5, -0.5), Vector3d(0.5, 0.5, 0.5));
+  const TensorField whole = cube_field(9, linear_tensor);
+  Eigen::Affine3d half = Eigen::Affine3d::Identity();
+  half.linear() *= 0.5;
+  const TensorField part = cube_field(9, linear_tensor, half);
+
+  const auto land = [](const TensorField& field, std::optional<TriangleMesh> cut, const Vector3d& from) {
+    Surfaces surfaces = surfaces_of(field);
+    surfaces.cut = std::move(cut);
+    surfaces.plate = plate_across({0, 0, -1}, 1.5);
+    return trace_one(field, Geometry(std::move(surfaces)),
+                     settings_of(BendingMethod::rk4, 0.25 * 0.25 / voxel_size(field)), from, {0, 0, -1}, 0.5);
+  };
+  for (const Vector3d& from : {Vector3d(0.2, -0.1, 2), Vector3d(0.7, 0, 2)}) {
+    const Ray cut = land(whole, box_mesh(inner, Eigen::Affine3d::Identity()), from);
+    EXPECT_EQ(cut.end, RayEnd::plate);
+    EXPECT_LT((cut.position - land(part, std::nullopt, from).position).norm(), 1e-8);
+  }
+}
+
+TEST(Bending, APlateThatTouchesTheVolumeCatchesLight) {
+  const TensorField field = constant_field(general_tensor());
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate_across({0, 0, -1}, 1);  // In the plane of the face where light leaves.
+  const Geometry geometry(std::move(surfaces));
+  for (int i = 0; i < 100; ++i) {
+    const Ray ray = trace_one(field, geometry, {}, {-0.5 + 0.01 * i, 0.003 * i - 0.2, 2}, {0, 0, -1}, 0.1);
+    EXPECT_EQ(ray.end, RayEnd::plate);
+    EXPECT_NEAR(ray.position.z(), -1, 1e-9);
+  }
+}
+
+/// In packets and by the reference.
+TEST(Bending, LightMayStartAnywhere) {
+  const TensorField field = constant_field(general_tensor());
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate_across({0, 0, -1}, 2);
+  const Geometry geometry(std::move(surfaces));
+  const Vector3d near(0.3, 0.1, 3), down(0, 0, -1);
+  for (const bool in_packets : {true, false}) {
+    const auto follow = [&](RayBatch& batch) {
+      in_packets ? trace(field, geometry, {}, batch) : trace_reference(field, geometry, {}, batch);
+    };
+    RayBatch batch;
+    batch.add(near, down, 0.2);
+    for (const double far : {1e3, 1e6, 1e9}) batch.add({near.x(), near.y(), far}, down, 0.2);
+    follow(batch);
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      EXPECT_EQ(batch.end[i], RayEnd::plate);
+      EXPECT_LT((batch.position[i] - batch.position[0]).norm(), 1e-6);
+    }
+
+    RayBatch lost;
+    for (const double far :
+         {1e12, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e30, 1e40, 1e200, 1e300, double{INFINITY}, double{NAN}})
+      for (const Vector3d& from : {Vector3d(near.x(), near.y(), far), Vector3d(-far, 0.3 * far, 0.7 * far)})
+        for (const Vector3d& direction : {down, Vector3d(1, -0.3, -0.7).normalized()}) lost.add(from, direction, 0.2);
+    follow(lost);  // To whatever end: it comes back.
+    for (std::size_t i = 0; i < lost.size(); ++i)
+      EXPECT_EQ(lost.end[i] == RayEnd::degenerate, i >= lost.size() - 8) << i;
+  }
+}
+
+TEST(Bending, RejectsSettingsOutOfRange) {
+  const TensorField field = constant_field(general_tensor());
+  const Geometry geometry(surfaces_of(field));
+  RayBatch batch;
+  BendingSettings settings;
+  settings.step = -1;
+  EXPECT_THROW(trace(field, geometry, settings, batch), std::invalid_argument);
+  settings = {};
+  settings.tolerance = 0;
+  EXPECT_THROW(trace(field, geometry, settings, batch), std::invalid_argument);
+  settings = {};
+  settings.max_steps = 0;
+  EXPECT_THROW(trace(field, geometry, settings, batch), std::invalid_argument);
+  settings = {};
+  settings.scale = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(trace(field, geometry, settings, batch), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,227 @@
+// Ray differentials against finite differences of the rays themselves, and against closed forms.
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/tracing/support.h"
+#include "tracing/trace/trace.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+using test::Ray;
+
+/// One ray with its derivatives along the two axes across its direction.
+struct Traced {
+  Ray ray;
+  RayDifferential differential;
+};
+
+/// The start of a ray as a function of two parameters: its position moves across, and its direction turns.
+struct Start {
+  Vector3d position, direction, across[2];
+  double turn = 0;  // Radians per unit of either parameter.
+
+  Vector3d position_at(double u, double v) const { return position + u * across[0] + v * across[1]; }
+  Vector3d direction_at(double u, double v) const {
+    return (direction + turn * (u * across[0] + v * across[1])).normalized();
+  }
+};
+
+Start make_start(const Vector3d& position, const Vector3d& direction, double turn) {
+  Start start{position, direction.normalized(), {}, turn};
+  start.across[0] = upright(start.direction, Vector3d::UnitX());
+  start.across[1] = start.direction.cross(start.across[0]);
+  return start;
+}
+
+Traced trace_with_differential(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                               const Start& start, double flexibility) {
+  RayBatch batch;
+  batch.add(start.position, start.direction, flexibility);
+  RayDifferential differential;
+  for (int i = 0; i < 2; ++i) {
+    differential.position.col(i) = start.across[i];
+    differential.direction.col(i) = start.turn * start.across[i];
+  }
+  batch.differentials.push_back(differential);
+  trace_reference(field, geometry, settings, batch);
+  return {{batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]}, batch.differentials[0]};
+}
+
+/// Central differences of the rays' landings.
+RayDifferential finite_differences(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                                   const Start& start, double flexibility, double delta) {
+  RayDifferential result;
+  for (int i = 0; i < 2; ++i) {
+    Ray side[2];
+    for (int sign : {0, 1}) {
+      const double d = sign ? delta : -delta;
+      const Vector3d position = start.position_at(i == 0 ? d : 0, i == 1 ? d : 0);
+      const Vector3d direction = start.direction_at(i == 0 ? d : 0, i == 1 ? d : 0);
+      side[sign] = test::trace_one(field, geometry, settings, position, direction, flexibility);
+      EXPECT_EQ(side[sign].end, RayEnd::plate);
+    }
+    result.position.col(i) = (side[1].position - side[0].position) / (2 * delta);
+    result.direction.col(i) = (side[1].direction - side[0].direction) / (2 * delta);
+  }
+  return result;
+}
+
+void expect_equal(const RayDifferential& a, const RayDifferential& b, double tolerance) {
+  EXPECT_LT((a.position - b.position).norm(), tolerance * b.position.norm()) << a.position << "\n" << b.position;
+  EXPECT_LT((a.direction - b.direction).norm(), tolerance * (b.direction.norm() + 0.1 * b.position.norm()))
+      << a.direction << "\n"
+      << b.direction;
+}
+
+class RayDifferentials : public ::testing::TestWithParam<BendingMethod> {
+ protected:
+  // Linear in position, so that interpolation is exact and has no kinks at the faces of cells.
+  const TensorField field_ = test::cube_field(17, test::linear_tensor);
+  const Vector3d direction_ = Vector3d(0.2, -0.3, -1).normalized();
+  const Start outside_ = make_start(Vector3d(0.1, 0.2, 2), direction_, 0.3);
+
+  // Differentials are the derivatives of the steps. They are exact between surfaces; at a surface they have the
+  // method's order.
+  BendingSettings settings() const {
+    BendingSettings settings = test::settings_of(GetParam(), GetParam() == BendingMethod::euler ? 1.0 / 128 : 0.25);
+    settings.tolerance = 1e-7;
+    return settings;
+  }
+  double tolerance() const { return GetParam() == BendingMethod::euler ? 1e-2 : 2e-3; }
+
+  void expect_finite_differences(const Geometry& geometry, const Start& start, double flexibility) {
+    const Traced traced = trace_with_differential(field_, geometry, settings(), start, flexibility);
+    ASSERT_EQ(traced.ray.end, RayEnd::plate);
+    const Ray alone = test::trace_one(field_, geometry, settings(), start.position, start.direction, flexibility);
+    EXPECT_LT((traced.ray.position - alone.position).norm(), 1e-9) << "differentials must not change the ray";
+    expect_equal(traced.differential, finite_differences(field_, geometry, settings(), start, flexibility, 1e-4),
+                 tolerance());
+  }
+};
+
+TEST_P(RayDifferentials, MatchFiniteDifferencesThroughTheVolume) {
+  Surfaces surfaces = test::surfaces_of(field_);
+  surfaces.plate = test::plate_across(direction_, 3);
+  expect_finite_differences(Geometry(surfaces), outside_, 0.5);
+}
+
+TEST_P(RayDifferentials, MatchOnATiltedPlateInsideTheVolume) {
+  Surfaces surfaces = test::surfaces_of(field_);
+  surfaces.plate = test::plate_across(Vector3d(0.5, 0.1, -1), 0.4);
+  expect_finite_differences(Geometry(surfaces), outside_, 0.5);
+}
+
+TEST_P(RayDifferentials, MatchFromInsideTheVolume) {
+  Surfaces surfaces = test::surfaces_of(field_);
+  surfaces.plate = test::plate_across(direction_, 3);
+  expect_finite_differences(Geometry(surfaces), make_start({0.1, 0.05, 0.3}, direction_, 0), -0.5);
+}
+
+TEST_P(RayDifferentials, MatchThroughACut) {
+  Surfaces surfaces = test::surfaces_of(field_);
+  Eigen::Affine3d turned = Eigen::Affine3d::Identity();
+  turned.linear() = Eigen::AngleAxisd(0.5, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  surfaces.cut = box_mesh(Eigen::AlignedBox3d(Vector3d::Constant(-0.5), Vector3d::Constant(0.5)), turned);
+  surfaces.plate = test::plate_across(direction_, 3);
+  expect_finite_differences(Geometry(surfaces), outside_, 0.5);
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryMethod, RayDifferentials,
+                         ::testing::Values(BendingMethod::euler, BendingMethod::splitting, BendingMethod::rk4,
+                                           BendingMethod::bs23, BendingMethod::dopri5));
+
+/// T = diag(a, b, 0): light along the z axis stays on it, and a beam near the axis spreads by δV' = s diag(a, b) δV.
+/// For parallel light δV begins at 0, so that it stays parallel. A beam that is not parallel is magnified.
+TEST(RayDifferential, ParallelLightAlongAnEigenvectorStaysParallel) {
+  const TensorField field = test::constant_field(Eigen::Vector3d(0.75, -0.5, 0).asDiagonal());
+  Surfaces surfaces = test::surfaces_of(field);
+  surfaces.plate = test::plate_across(-Vector3d::UnitZ(), 2);
+  const Geometry geometry(surfaces);
+  const BendingSettings settings;
+  const Traced parallel =
+      trace_with_differential(field, geometry, settings, make_start({0, 0, 2}, -Vector3d::UnitZ(), 0), 1);
+  EXPECT_NEAR(parallel.differential.position.col(0).norm(), 1, 1e-9);
+  EXPECT_NEAR(parallel.differential.direction.norm(), 0, 1e-9);
+
+  // Within the volume, of depth 2, a turn grows along x by exp(0.75 · 2), and moves the ray sideways by the turn times
+  // ∫ exp(0.75 t) dt. The light is straight for one unit before the volume and for one unit behind it.
+  const double turn = 0.1;
+  const Traced turned =
+      trace_with_differential(field, geometry, settings, make_start({0, 0, 2}, -Vector3d::UnitZ(), turn), 1);
+  const double expected = 1 + turn * (1 + (std::exp(1.5) - 1) / 0.75 + std::exp(1.5));
+  // The error of the drift, with a step of ½ voxel (1/8), is of second order: h²/24 times the integral of the second
+  // derivative.
+  EXPECT_NEAR(turned.differential.position.col(0).norm(), expected, turn * 1e-2);
+  EXPECT_NEAR(turned.differential.direction.col(0).norm(), turn * std::exp(1.5), 1e-9);
+}
+
+/// Strong kicks use another branch of the exponential.
+TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
+  const TensorField field = test::cube_field(17, test::linear_tensor);
+  Surfaces surfaces = test::surfaces_of(field);
+  const Vector3d direction(0, 0, -1);
+  surfaces.plate = test::plate_across(direction, 1);
+  const Geometry geometry(surfaces);
+  const BendingSettings settings =
+      test::settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ is about 8.
+  const Start start = make_start({0.1, -0.2, 0.3}, direction, 0);
+  RayBatch batch;
+  batch.add(start.position, start.direction, 8);
+  BendingSettings one_step = settings;
+  one_step.max_steps = 1;
+  batch.differentials.push_back({(Eigen::Matrix<double, 3, 2>() << start.across[0], start.across[1]).finished(), {}});
+  batch.differentials[0].direction.setZero();
+  trace_reference(field, geometry, one_step, batch);
+  ASSERT_EQ(batch.end[0], RayEnd::step_limit);
+  for (int i = 0; i < 2; ++i) {
+    const double d = 1e-5;
+    const auto side = [&](double sign) {
+      return test::trace_one(field, geometry, one_step, start.position + sign * d * start.across[i], direction, 8);
+    };
+    const Vector3d position = (side(1).position - side(-1).position) / (2 * d);
+    const Vector3d turned = (side(1).direction - side(-1).direction) / (2 * d);
+    // Both take the same steps, so that only the error of the finite differences remains.
+    EXPECT_LT((batch.differentials[0].position.col(i) - position).norm(), 1e-6 * position.norm());
+    EXPECT_LT((batch.differentials[0].direction.col(i) - turned).norm(), 1e-6 * (1 + turned.norm()));
+  }
+}
+
+TEST(RayDifferential, LengthIsThatOfTheWay) {
+  const TensorField field = test::constant_field(Eigen::Matrix3d::Zero());
+  Surfaces surfaces = test::surfaces_of(field);
+  const Vector3d direction = Vector3d(0.3, 0.1, -1).normalized();
+  surfaces.plate = test::plate_across(direction, 3);
+  RayBatch batch;
+  batch.add(-2 * direction, direction, 1);
+  trace_reference(field, Geometry(surfaces), {}, batch);
+  EXPECT_NEAR(batch.length[0], 5, 1e-9);
+
+  // A circle: an antisymmetric tensor turns light at a constant rate, and the length is the angle divided by this rate.
+  Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();
+  turning(0, 2) = 0.5;
+  turning(2, 0) = -0.5;
+  const TensorField circle = test::constant_field(turning);
+  RayBatch arc;
+  arc.add({0, 0, 0.9}, {0, 0, -1}, 1);
+  trace_reference(circle, Geometry(test::surfaces_of(circle)), test::settings_of(BendingMethod::splitting, 1.0 / 16),
+                  arc);
+  ASSERT_EQ(arc.end[0], RayEnd::missed);
+  const double angle = std::acos(-arc.direction[0].z());
+  EXPECT_NEAR(arc.length[0], angle / 0.5, 1e-4);
+}
+
+TEST(RayDifferential, BatchesHaveThemForAllRaysOrNone) {
+  const TensorField field = test::constant_field(Eigen::Matrix3d::Zero());
+  RayBatch batch;
+  batch.add({0, 0, 0}, {0, 0, 1}, 1);
+  batch.add({0, 0, 0}, {0, 0, 1}, 1);
+  batch.differentials.resize(1);
+  EXPECT_THROW(trace(field, Geometry(test::surfaces_of(field)), {}, batch), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,222 @@
+#include "tracing/bending/geometry.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "renderer/meshes/mesh.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+Eigen::AlignedBox3d unit_box() { return {Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}; }
+
+Surfaces box_surfaces(const Eigen::Affine3d& transform = Eigen::Affine3d::Identity()) {
+  Surfaces surfaces;
+  surfaces.bounds = box_mesh(unit_box(), transform);
+  return surfaces;
+}
+
+/// Where a line enters and leaves the box, by the slab method.
+bool slabs(const Vector3d& origin, const Vector3d& direction, double& near, double& far) {
+  near = -1e300, far = 1e300;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = (-1 - origin[axis]) / direction[axis], b = (1 - origin[axis]) / direction[axis];
+    near = std::max(near, std::min(a, b));
+    far = std::min(far, std::max(a, b));
+  }
+  return near < far;
+}
+
+TEST(Geometry, BoxAgreesWithTheAnalyticOne) {
+  const Geometry geometry(box_surfaces());
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  int hits = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Vector3d origin = 4 * Vector3d(normal(random), normal(random), normal(random)).normalized();
+    const Vector3d direction = (0.5 * Vector3d(normal(random), normal(random), normal(random)) - origin).normalized();
+    double near, far;
+    const bool expected = slabs(origin, direction, near, far);
+    if (expected && far - near < 1e-4) continue;  // The line grazes an edge: rounding decides.
+    const auto entry = geometry.crossing(Surface::bounds, true, origin, direction);
+    const auto exit = geometry.crossing(Surface::bounds, false, origin, direction);
+    ASSERT_EQ(entry.has_value(), expected);
+    ASSERT_EQ(exit.has_value(), expected);
+    if (!expected) continue;
+    ++hits;
+    EXPECT_NEAR(entry->distance, near, 1e-12);  // The result has double precision, although Embree's is single.
+    EXPECT_NEAR(exit->distance, far, 1e-12);
+    EXPECT_LT(entry->normal.dot(direction), 0);
+    EXPECT_GT(exit->normal.dot(direction), 0);
+  }
+  EXPECT_GT(hits, 1000);
+}
+
+TEST(Geometry, StaysPreciseFarFromTheOrigin) {
+  Eigen::Affine3d far = Eigen::Affine3d::Identity();
+  far.translation() = Vector3d(1e6, -1e6, 1e6);
+  const Geometry geometry(box_surfaces(far));
+  const auto hit = geometry.crossing(Surface::bounds, true, far * Vector3d(0.3, 0.2, 5), Vector3d(0, 0, -1));
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR(hit->distance, 4, 1e-8);
+}
+
+TEST(Geometry, WorksInAnyUnit) {
+  for (const double unit : {1e-20, 1e-6, 1e12, 1e20}) {
+    Eigen::Affine3d scaled = Eigen::Affine3d::Identity();
+    scaled.linear() *= unit;
+    const Geometry geometry(box_surfaces(scaled));
+    const auto hit = geometry.crossing(Surface::bounds, false, scaled * Vector3d(0.3, 0.2, 0), Vector3d(0, 0, -1));
+    ASSERT_TRUE(hit) << unit;
+    EXPECT_NEAR(hit->distance / unit, 1, 1e-12);
+  }
+}
+
+TEST(Geometry, LightMayStartAnywhere) {
+  Surfaces surfaces = box_surfaces();
+  surfaces.plate = Plate();
+  surfaces.plate->center = {0, 0, -3};
+  surfaces.cut = box_mesh(unit_box(), Eigen::Affine3d(Eigen::Scaling(0.5)));
+  const Geometry geometry(std::move(surfaces));
+  const Vector3d down(0, 0, -1);
+  for (const double far : {1e3, 1e6, 1e9}) {
+    const Vector3d from(0.3, 0.2, far);
+    EXPECT_NEAR(geometry.crossing(Surface::bounds, true, from, down)->distance, far - 1, 1e-15 * far);
+    EXPECT_NEAR(geometry.crossing(Surface::bounds, false, from, down)->distance, far + 1, 1e-15 * far);
+    EXPECT_NEAR(geometry.crossing(Surface::cut, true, from, down)->distance, far - 0.5, 1e-15 * far);
+    EXPECT_NEAR(geometry.absorber(from, down)->distance, far + 3, 1e-15 * far);
+    EXPECT_FALSE(geometry.inside_cut(from));
+  }
+  const double nan = std::nan("");
+  for (const double far : {1e13, 1e20, 1e40, 1e300, Geometry::infinite, nan})
+    for (const Vector3d& from : {Vector3d(far, 0, 0), Vector3d(0.3, 0.2, far)})
+      for (const Vector3d& direction : {down, Vector3d(0.6, 0, -0.8), Vector3d(nan, 0, 1)})
+        for (const bool inwards : {false, true}) {
+          const auto hit = geometry.crossing(Surface::bounds, inwards, from, direction);
+          if (from.x() == far && far > 1e100) {
+            EXPECT_FALSE(hit);
+          }
+          geometry.absorber(from, direction);
+          EXPECT_FALSE(geometry.inside_cut(from));
+        }
+}
+
+TEST(Geometry, RefusesSurfacesBeyondSinglePrecision) {
+  for (const double far : {1e14, 1e40, 1e300, std::nan("")}) {
+    Surfaces with_plate = box_surfaces(), with_obstacle = box_surfaces(), with_cut = box_surfaces();
+    with_plate.plate = Plate();
+    with_plate.plate->center = {0, 0, far};
+    const TriangleMesh box = box_mesh({Vector3d(far, 0, 0), Vector3d(far, 1, 1)}, Eigen::Affine3d::Identity());
+    with_obstacle.obstacles = {box_mesh(unit_box(), Eigen::Affine3d::Identity()), box};
+    with_cut.cut = box;
+    EXPECT_EQ(message([&] { Geometry(std::move(with_plate)); }).find("the receiver"), 0u) << far;
+    EXPECT_EQ(message([&] { Geometry(std::move(with_obstacle)); }).find("obstacle 1"), 0u) << far;
+    EXPECT_EQ(message([&] { Geometry(std::move(with_cut)); }).find("the mesh that cuts"), 0u) << far;
+  }
+}
+
+/// Rays hit a plate as far away as Geometry allows.
+TEST(Geometry, MeetsThePlateAsFarAsItIsAllowed) {
+  for (const double far : {1e3, 1e6, 1e9, 1e12}) {
+    Surfaces surfaces = box_surfaces();
+    surfaces.plate = Plate();
+    surfaces.plate->center = {0, 0, -far};
+    surfaces.plate->size = {far, far};
+    const Geometry geometry(std::move(surfaces));
+    const auto hit = geometry.absorber({0.1, 0.2, 0.5}, Vector3d(0.1, 0.2, -1).normalized());
+    ASSERT_TRUE(hit) << far;
+    EXPECT_NEAR(hit->distance, std::sqrt(1.05) * (far + 0.5), 1e-12 * far);
+  }
+}
+
+TEST(Geometry, PlateIsHitFromBothSidesAndOnlyWithinIt) {
+  Surfaces surfaces = box_surfaces();
+  Plate plate;
+  plate.center = {0, 0, -3};
+  plate.size = {2, 1};
+  surfaces.plate = plate;
+  const Geometry geometry(std::move(surfaces));
+  const auto below = geometry.absorber({0.9, 0.4, -5}, {0, 0, 1}), above = geometry.absorber({0.9, 0.4, 5}, {0, 0, -1});
+  ASSERT_TRUE(below && above);
+  EXPECT_EQ(below->surface, Surface::plate);
+  EXPECT_NEAR(below->distance, 2, 1e-12);
+  EXPECT_NEAR(above->distance, 8, 1e-12);
+  EXPECT_FALSE(geometry.absorber({0.9, 0.6, 5}, {0, 0, -1}));
+  EXPECT_FALSE(geometry.absorber({0.9, 0.4, 5}, {0, 0, -1}, 7.9));
+  EXPECT_TRUE(geometry.may_absorb({0, 0, -2}, {0, 0, -4}));
+  EXPECT_FALSE(geometry.may_absorb({0, 0, 1}, {0, 0, -1}));
+}
+
+TEST(Geometry, ASurfaceAtTheOriginOfARayIsHit) {
+  Surfaces surfaces = box_surfaces();
+  Plate plate;
+  plate.center = {0, 0, 1.0 / 3};
+  plate.size = {2, 2};
+  surfaces.plate = plate;
+  const Geometry geometry(std::move(surfaces));
+  for (const double before : {0.0, 1e-9, -1e-9}) {
+    const auto hit = geometry.absorber({0.1, 0.2, 1.0 / 3 + before}, {0, 0, -1});
+    ASSERT_TRUE(hit) << before;
+    EXPECT_GE(hit->distance, 0);
+    EXPECT_LT(hit->distance, 1e-8);
+  }
+}
+
+TEST(Geometry, ObstaclesAreToldFromThePlate) {
+  Surfaces surfaces = box_surfaces();
+  Plate plate;
+  plate.center = {0, 0, -3};
+  surfaces.plate = plate;
+  surfaces.obstacles.push_back(
+      box_mesh({Vector3d(-0.2, -0.2, -2.2), Vector3d(0.2, 0.2, -2)}, Eigen::Affine3d::Identity()));
+  const Geometry geometry(std::move(surfaces));
+  const auto blocked = geometry.absorber({0, 0, 5}, {0, 0, -1});
+  ASSERT_TRUE(blocked);
+  EXPECT_EQ(blocked->surface, Surface::obstacle);
+  EXPECT_NEAR(blocked->distance, 7, 1e-12);
+}
+
+TEST(Geometry, KnowsWhatIsInsideTheCut) {
+  Surfaces surfaces = box_surfaces();
+  Eigen::Affine3d turned = Eigen::Affine3d::Identity();
+  turned.linear() = 0.5 * Eigen::AngleAxisd(0.5, Vector3d(1, 1, 0).normalized()).toRotationMatrix();
+  surfaces.cut = box_mesh(unit_box(), turned);
+  const Geometry geometry(std::move(surfaces));
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int i = 0; i < 2000; ++i) {
+    const Vector3d point(uniform(random), uniform(random), uniform(random));
+    const double depth = 1 - (turned.inverse() * point).cwiseAbs().maxCoeff();
+    if (std::abs(depth) < 1e-4) continue;  // Rounding decides.
+    EXPECT_EQ(geometry.inside_cut(point), depth > 0);
+  }
+  EXPECT_TRUE(Geometry(box_surfaces()).inside_cut({9, 9, 9}));
+}
+
+TEST(Plate, PixelsAndWorldAreInverse) {
+  Plate plate;
+  plate.center = {1, 2, 3};
+  plate.right = Vector3d(1, 2, 0).normalized();
+  plate.up = Vector3d(-2, 1, 0).normalized();
+  plate.size = {3, 2};
+  plate.resolution = {300, 100};
+  EXPECT_LT((plate.to_pixel(plate.center) - Eigen::Vector2d(150, 50)).norm(), 1e-12);
+  EXPECT_LT((plate.to_pixel(plate.center + 1.5 * plate.right + plate.up) - Eigen::Vector2d(300, 0)).norm(), 1e-12);
+  EXPECT_LT((plate.to_pixel(plate.to_world({12.5, 77}) + 4 * plate.normal()) - Eigen::Vector2d(12.5, 77)).norm(),
+            1e-12);
+  EXPECT_NEAR(plate.pixel_area(), 3.0 / 300 * 2 / 100, 1e-15);
+}
+
+TEST(Plate, UprightIsAcrossTheDirection) {
+  EXPECT_LT((upright({0, 0, -1}, {0, 0, 1}) - Vector3d::UnitY()).norm(), 1e-15);
+  EXPECT_LT((upright({1, 0, 0}, {1, 0, 1}) - Vector3d::UnitZ()).norm(), 1e-15);
+  EXPECT_LT((upright({3, 0, 0}, {0, 0, 0}) - Vector3d::UnitZ()).norm(), 1e-15);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,354 @@
+// The flow map, and the light that it carries to its plate.
+
+#include "tracing/flow/flow_map.h"
+
+#include <cmath>
+#include <numeric>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "base/constants.h"
+#include "integrators/photon_distribution/photon_distribution.h"
+#include "renderer/spectra/spectrum.h"
+#include "tests/tracing/flow_support.h"
+#include "tracing/flow/ray_memory.h"
+#include "tracing/trace/trace.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// What `photons` single photons of the same light give, with the standard deviation of the noise of their number.
+Film histogram(const FlowBench& bench, double flexibility, std::uint64_t photons) {
+  PhotonSettings settings;
+  settings.photons = photons;
+  settings.density.kind = DensityKind::histogram;
+  return distribute_photons(bench.field, bench.geometry, bench.beam, {{flexibility, 550, 1}}, settings, Progress())
+      .irradiance;
+}
+
+/// The greatest value of a pixel and its eight neighbours.
+double greatest_near(const Film& film, int x, int y) {
+  double greatest = 0;
+  for (int v = std::max(0, y - 1); v < std::min(film.height, y + 2); ++v)
+    for (int u = std::max(0, x - 1); u < std::min(film.width, x + 2); ++u)
+      greatest = std::max(greatest, film.plane(0)[v * film.width + u]);
+  return greatest;
+}
+
+/// Compares the light of the map with single photons: the deviations of the pixels, in units of the noise of the
+/// photons' number and of the light that the map's tolerance may move across a pixel's edge, are those of noise.
+void expect_same_light(const FlowBench& bench, double flexibility, const char* label) {
+  constexpr std::uint64_t photons = 400000;
+  const Film expected = histogram(bench, flexibility, photons);
+  FlowSettings settings = single(flexibility);
+  settings.tolerance = 0.05;
+  const Caustic caustic = caustic_of(bench, map_of(bench, settings));
+  EXPECT_NEAR(all_power(caustic), 1, 1e-9) << label;
+  const double per_photon = area(bench.beam.aperture) / static_cast<double>(photons) / bench.plate().pixel_area();
+  double squares = 0;
+  for (int y = 0; y < expected.height; ++y)
+    for (int x = 0; x < expected.width; ++x) {
+      const double light = caustic.irradiance.plane(0)[y * expected.width + x];
+      const double moved = settings.tolerance * greatest_near(caustic.irradiance, x, y);
+      const double noise = std::sqrt(std::max(light, per_photon) * per_photon) + moved;
+      squares += std::pow((light - expected.plane(0)[y * expected.width + x]) / noise, 2);
+    }
+  EXPECT_LT(squares / static_cast<double>(expected.values.size()), 1) << label;
+  EXPECT_NEAR(sum(caustic.irradiance.values) / sum(expected.values), 1, 2e-3) << label;
+}
+
+/// With a memory, light to another plate is traced only where it was not traced before.
+TEST(FlowMap, RememberedRaysGiveTheSameMap) {
+  FlowSettings settings;
+  settings.flexibilities = {0.1, 0.4};
+  settings.range = true;
+  FlowSettings remembering = settings;
+  remembering.memory = std::make_shared<RayMemory>();
+  std::vector<std::uint64_t> samples;
+  for (const double distance : {2.0, 2.1, 2.0}) {
+    const FlowBench bench = make_bench(lens, plate_at(distance, 4, 64));
+    const FlowMap map = trace_flow_map(bench.field, bench.geometry, bench.beam, {}, remembering, Progress());
+    const FlowMap expected = trace_flow_map(bench.field, bench.geometry, bench.beam, {}, settings, Progress());
+    EXPECT_EQ(map.landings, expected.landings);
+    EXPECT_EQ(map.ends, expected.ends);
+    EXPECT_EQ(map.lengths, expected.lengths);
+    EXPECT_EQ(map.starts, expected.starts);
+    samples.push_back(map.tensor_samples);
+  }
+  EXPECT_LT(2 * samples[1], samples[0]);
+  EXPECT_EQ(samples[2], 0u);
+}
+
+TEST(FlowMap, RaysAreRememberedOnlyWhereTheyMeetNothingElse) {
+  const auto serves = [](const FlowBench& bench) {
+    return RayMemory::serves(bench.field, bench.geometry, bench.beam.direction, {});
+  };
+  EXPECT_TRUE(serves(make_bench(lens, plate_at(2, 4, 64))));
+  EXPECT_FALSE(serves(make_bench(lens, plate_at(0.5, 4, 64))));  // Inside.
+  EXPECT_FALSE(serves(make_bench(lens, plate_at(-2, 4, 64))));   // In front.
+  Surfaces extra;
+  extra.obstacles.push_back(
+      box_mesh(Eigen::AlignedBox3d(Vector3d(-0.2, -0.2, -2), Vector3d(0.2, 0.2, -1.8)), Eigen::Affine3d::Identity()));
+  EXPECT_FALSE(serves(make_bench(lens, plate_at(3, 4, 64), extra)));
+}
+
+TEST(FlowMap, CoversTheApertureOnce) {
+  for (const Vector3d& direction : {Vector3d(0, 0, -1), Vector3d(0.3, 0.2, -1), Vector3d(1, 1, -1)}) {
+    Plate plate = plate_across(direction, 3);
+    plate.size = {4, 4};
+    plate.resolution = {64, 64};
+    const FlowBench bench = make_bench(lens, plate, {}, 9, direction);
+    const FlowMap map = map_of(bench, single(0.3));
+    double covered = 0;
+    for (const FlowTriangle& triangle : map.triangles) {
+      EXPECT_GT(triangle.area, 0);
+      covered += triangle.area;
+    }
+    EXPECT_NEAR(covered, area(bench.beam.aperture), 1e-9);
+    // Each triangle has three edges.
+    std::vector<int> sides(map.triangles.size());
+    for (const FlowEdge& edge : map.edges)
+      for (const std::uint32_t triangle : {edge.along, edge.against})
+        if (triangle != FlowEdge::none) ++sides[triangle];
+    for (const int count : sides) ASSERT_EQ(count, 3);
+  }
+}
+
+TEST(FlowMap, UndisturbedLightIsExactlyOne) {
+  const FlowBench bench = make_bench(zero, plate_at(2, 1.5, 48));  // The beam is wider than the plate.
+  const Caustic caustic = caustic_of(bench, map_of(bench, single(0.3)));
+  for (const double value : caustic.irradiance.values) ASSERT_NEAR(value, 1, 2e-5);  // Landings are single precision.
+  EXPECT_NEAR(power_of(caustic, RayEnd::plate), 1.5 * 1.5 / 4, 1e-6);
+  EXPECT_NEAR(power_of(caustic, RayEnd::missed), 1 - 1.5 * 1.5 / 4, 1e-6);
+}
+
+TEST(FlowMap, IsTheLightOfSinglePhotons) {
+  expect_same_light(make_bench(lens, plate_at(2.2, 3, 48)), 0.4, "folded light");
+  expect_same_light(make_bench(lens, plate_at(2.2, 0.8, 48)), 0.4, "a plate that is smaller than the light");
+  expect_same_light(make_bench(lens, plate_at(0.3, 3, 48)), 0.4, "a plate inside the volume");
+  expect_same_light(make_bench(lens, plate_at(40, 60, 48)), 0.2, "a far plate");
+  expect_same_light(make_bench(lens, plate_at(2.2, 3, 48), {}, 5), 0.4, "large voxels");
+  Plate tilted = plate_at(2.5, 4, 48);
+  const Eigen::AngleAxisd turn(0.7, Vector3d(1, 0.4, 0).normalized());
+  tilted.right = turn * tilted.right;
+  tilted.up = turn * tilted.up;
+  expect_same_light(make_bench(lens, tilted), 0.4, "a tilted plate");
+}
+
+TEST(FlowMap, EndsAtObstaclesAndCuts) {
+  Surfaces surfaces;
+  surfaces.obstacles.push_back(box_mesh(Eigen::AlignedBox3d(Vector3d(-0.4, -0.3, -1.6), Vector3d(0.2, 0.25, -1.5)),
+                                        Eigen::Affine3d::Identity()));
+  const FlowBench shadow = make_bench(lens, plate_at(2.2, 3, 48), surfaces);
+  expect_same_light(shadow, 0.4, "an obstacle's shadow");
+  EXPECT_GT(power_of(caustic_of(shadow, map_of(shadow, single(0.4))), RayEnd::obstacle), 0.003);
+  Surfaces cut;
+  cut.cut =
+      box_mesh(Eigen::AlignedBox3d(Vector3d(-0.5, -0.6, -0.7), Vector3d(0.6, 0.4, 0.8)), Eigen::Affine3d::Identity());
+  expect_same_light(make_bench(lens, plate_at(2.2, 3, 48), cut), 0.4, "a cut volume");
+}
+
+/// A field that pushes light out at its faces ±x, and back in where it has come far enough: it ends where it began, but
+/// light that starts within 0.04 of the face, a third of a voxel, leaves through it, and lands up to 0.2 beside.
+Matrix3d hook(const Vector3d& at) {
+  constexpr double width = 0.04, flexibility = 0.4;
+  Matrix3d tensor = Matrix3d::Zero();
+  tensor(0, 2) = -at.x() * width * pi * pi / 2 / flexibility * std::cos(pi * (1 - at.z()));
+  return tensor;
+}
+
+/// Corners of quads at the edge of the beam agree, and what lies between them lands elsewhere.
+TEST(FlowMap, LightThatLeavesBetweenCornersIsNotOverlooked) {
+  constexpr double size = 3;
+  for (const int resolution : {64, 128, 256}) {
+    const FlowBench bench = make_bench(hook, plate_at(4, size, resolution));
+    const Film light = caustic_of(bench, map_of(bench, single(0.4))).irradiance;
+    const Film expected = histogram(bench, 0.4, 400000);
+    const auto beside = [&](const Film& film) {  // More than 0.05 beside the undisturbed beam.
+      double sum = 0;
+      for (int y = 0; y < resolution; ++y)
+        for (int x = 0; x < resolution; ++x)
+          if (std::abs((x + 0.5) / resolution - 0.5) * size > 1.05) sum += film.plane(0)[y * resolution + x];
+      return sum * bench.plate().pixel_area() / area(bench.beam.aperture);
+    };
+    // Where light is torn, half of a smallest quad may be on the wrong side; the beam is 2 wide.
+    const double part = beside(expected), noise = std::sqrt(part / 400000),
+                 torn = 2 * 0.5 * single(0.4).finest * size / resolution / 2;
+    EXPECT_GT(part, 0.02);
+    EXPECT_NEAR(beside(light), part, 4 * noise + torn) << resolution;
+  }
+}
+
+/// Landings between traced samples are those of rays of the flexibility between them.
+TEST(FlowMap, InterpolatedLandingsAreThoseOfRays) {
+  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 256));
+  const FlowSettings settings = range(0.1, 0.6);
+  const FlowMap map = map_of(bench, settings);
+  EXPECT_LT(static_cast<double>(map.rays), 20.0 * static_cast<double>(map.starts.size()));  // Of 33.
+  RayBatch batch;
+  std::vector<std::size_t> which;
+  for (std::size_t i = 0; i < map.starts.size(); i += 7) {
+    const std::size_t sample = i % map.wavelengths;
+    const Vector2d& start = map.starts[i];
+    batch.add(bench.beam.center + start.x() * bench.beam.right + start.y() * bench.beam.up, bench.beam.direction,
+              0.1 + 0.5 * static_cast<double>(sample) / static_cast<double>(map.wavelengths - 1));
+    which.push_back(i * map.wavelengths + sample);
+  }
+  trace(bench.field, bench.geometry, {}, batch);
+  std::size_t compared = 0, near = 0;
+  for (std::size_t k = 0; k < which.size(); ++k) {
+    if (batch.end[k] != RayEnd::plate || map.ends[which[k]] != RayEnd::plate) continue;
+    ++compared;
+    near += (bench.plate().to_pixel(batch.position[k]) - map.landings[which[k]].cast<double>()).norm() < 0.25;
+  }
+  EXPECT_GT(compared, 100u);
+  // Vertices that were added in the middle of quads have the mean of the corners' landings.
+  EXPECT_GT(static_cast<double>(near), 0.97 * static_cast<double>(compared));
+}
+
+/// The map with all samples traced, of the vertices that were traced at all (others lie in the middle of two).
+FlowMap with_all_samples(const FlowBench& bench, const FlowSettings& settings, FlowMap map) {
+  RayBatch batch;
+  for (const Vector2d& start : map.starts)
+    for (std::size_t sample = 0; sample < map.wavelengths; ++sample) {
+      const double part = static_cast<double>(sample) / static_cast<double>(map.wavelengths - 1);
+      batch.add(bench.beam.center + start.x() * bench.beam.right + start.y() * bench.beam.up, bench.beam.direction,
+                (1 - part) * settings.flexibilities[0] + part * settings.flexibilities[1]);
+    }
+  trace(bench.field, bench.geometry, {}, batch);
+  for (std::size_t first = 0; first < batch.size(); first += map.wavelengths) {
+    const auto landing = [&](std::size_t sample) -> Eigen::Vector2f {
+      return bench.plate().to_pixel(batch.position[first + sample]).cast<float>();
+    };
+    bool was_traced = true;
+    for (std::size_t sample = 0; sample < map.wavelengths; sample += map.wavelengths - 1)
+      was_traced = was_traced && batch.end[first + sample] == RayEnd::plate &&
+                   (landing(sample) - map.landings[first + sample]).norm() < 1e-3f;
+    for (std::size_t sample = 0; was_traced && sample < map.wavelengths; ++sample)
+      if (map.ends[first + sample] == RayEnd::plate) map.landings[first + sample] = landing(sample);
+  }
+  return map;
+}
+
+/// CIE L*a*b*, where `white` is white.
+Vector3d lab(const Vector3d& xyz, const Vector3d& white) {
+  Vector3d f;
+  for (int i = 0; i < 3; ++i) {
+    const double part = xyz[i] / white[i];
+    f[i] = part > 216.0 / 24389 ? std::cbrt(part) : (24389.0 / 27 * part + 16) / 116;
+  }
+  return {116 * f.y() - 16, 500 * (f.x() - f.y()), 200 * (f.y() - f.z())};
+}
+
+TEST(FlowMap, InterpolatedWavelengthsHardlyChangeColours) {
+  constexpr int count = 64;
+  std::vector<CausticBand> bands;
+  Vector3d white = Vector3d::Zero();
+  for (int i = 0; i < count; ++i) {
+    const double place = (i + 0.5) / count;
+    bands.push_back({32 * place, 0, 0, 1.0 / count, observer(380 + 400 * place)});
+    white += bands.back().color;
+  }
+  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 64));
+  FlowSettings settings = range(0.1, 0.3);
+  settings.tolerance = 0.06;
+  const FlowMap few = map_of(bench, settings);
+  EXPECT_LT(static_cast<double>(few.rays), 0.3 * static_cast<double>(few.landings.size()));
+  const Film a = caustic_of(bench, few, bands).color,
+             b = caustic_of(bench, with_all_samples(bench, settings, few), bands).color;
+  double greatest = 0;
+  for (std::size_t i = 0; i < a.plane_size(); ++i) {
+    const auto at = [&](const Film& film) {
+      return lab({film.plane(0)[i], film.plane(1)[i], film.plane(2)[i]}, white);
+    };
+    greatest = std::max(greatest, (at(a) - at(b)).norm());
+  }
+  EXPECT_LT(greatest, 0.5);
+  EXPECT_GT(greatest, 0);
+}
+
+TEST(FlowMap, TheSameOnAnyNumberOfThreads) {
+  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 64));
+  std::vector<Caustic> caustics;
+  for (const std::size_t threads : {1, 2, 8}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const FlowMap map = map_of(bench, range(0.1, 0.6));
+    std::vector<CausticBand> bands;
+    for (int i = 0; i < 20; ++i) bands.push_back({(i + 0.5) / 20 * 32, 1.6, 0, 0.05, Vector3d(0.05, 0.1, i)});
+    caustics.push_back(caustic_of(bench, map, bands));
+  }
+  for (const Caustic& caustic : caustics) {
+    EXPECT_EQ(caustic.irradiance.values, caustics[0].irradiance.values);
+    EXPECT_EQ(caustic.color.values, caustics[0].color.values);
+    EXPECT_EQ(caustic.power, caustics[0].power);
+  }
+}
+
+/// Where large quads are smooth, their light is even within a triangle, which is of first order in their size: the
+/// error falls by more than half with a quarter of the tolerance, and by more where quads are near a pixel.
+TEST(FlowMap, ConvergesWithItsTolerance) {
+  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 128));
+  const auto light = [&](double tolerance) {
+    FlowSettings settings = single(0.1);
+    settings.tolerance = tolerance;
+    return caustic_of(bench, map_of(bench, settings)).irradiance.values;
+  };
+  const std::vector<double> exact = light(0.002);
+  std::vector<double> errors;
+  for (const double tolerance : {0.8, 0.2, 0.05}) {
+    const std::vector<double> values = light(tolerance);
+    double squares = 0, all = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      squares += std::pow(values[i] - exact[i], 2);
+      all += exact[i] * exact[i];
+    }
+    errors.push_back(std::sqrt(squares / all));
+  }
+  EXPECT_LT(errors[1], errors[0] / 2);
+  EXPECT_LT(errors[2], errors[1] / 3);
+  EXPECT_LT(errors[2], 0.005);
+}
+
+TEST(FlowMap, KeepsToItsNumberOfVertices) {
+  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 512));
+  for (const std::size_t most : {1u, 100u, 3000u}) {
+    FlowSettings settings = single(0.4);
+    settings.most_starts = most;
+    const FlowMap map = map_of(bench, settings);
+    EXPECT_LT(map.starts.size(), 2 * most + 64);  // Vertices in the middles of quads come on top.
+    EXPECT_FALSE(map.is_complete);
+    EXPECT_NEAR(all_power(caustic_of(bench, map)), 1, 1e-9);
+  }
+  EXPECT_TRUE(map_of(make_bench(lens, plate_at(2.2, 3, 32)), single(0.1)).is_complete);
+}
+
+TEST(FlowMap, BadSettingsAreRefused) {
+  const FlowBench bench = make_bench(zero, plate_at(2, 3, 8));
+  FlowSettings settings;
+  EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
+  settings = single(0.1);
+  settings.range = true;
+  EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
+  settings = single(0.1);
+  settings.tolerance = std::nan("");
+  EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
+  settings = single(0.1);
+  settings.most_starts = 0;
+  EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
+}
+
+TEST(FlowMap, CanBeCancelled) {
+  const FlowBench bench = make_bench(lens, plate_at(2, 3, 64));
+  Progress progress;
+  progress.cancelled = true;
+  EXPECT_THROW(trace_flow_map(bench.field, bench.geometry, bench.beam, {}, single(0.1), progress), Cancelled);
+}
+
+}  // namespace
+}  // namespace tensorray

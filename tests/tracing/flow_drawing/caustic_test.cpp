@@ -1,0 +1,259 @@
+// The light that a flow map carries to its plate.
+
+#include "tracing/flow_drawing/caustic.h"
+
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "tests/tracing/flow_support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Vector2d;
+
+/// A map that is given, over a lattice of `count` × `count` quads of the unit square.
+template <class Map>
+FlowMap lattice_map(int count, const Map& map) {
+  FlowMap result;
+  for (int y = 0; y <= count; ++y)
+    for (int x = 0; x <= count; ++x) {
+      result.starts.emplace_back(double(x) / count, double(y) / count);
+      result.landings.push_back(map(result.starts.back()).template cast<float>());
+    }
+  result.ends.assign(result.starts.size(), RayEnd::plate);
+  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    const auto triangle = static_cast<std::uint32_t>(result.triangles.size());
+    result.triangles.push_back({{a, b, c}, 0.5 / count / count, false});
+    for (const auto& [from, to] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)})
+      result.edges.push_back({from, to, triangle});
+  };
+  for (int y = 0; y < count; ++y)
+    for (int x = 0; x < count; ++x) {
+      const auto a = static_cast<std::uint32_t>(y * (count + 1) + x), up = static_cast<std::uint32_t>(count + 1);
+      add(a, a + 1, a + up + 1);
+      add(a, a + up + 1, a + up);
+    }
+  return result;
+}
+
+/// L2 distance from `exact`, the power of each pixel, as a part of its norm. The power is exact.
+double distance(const FlowMap& map, const Plate& plate, const std::vector<double>& exact) {
+  const Caustic caustic = draw_caustic(map, plate, {CausticBand{}}, {}, Progress());
+  EXPECT_NEAR(power_of(caustic, RayEnd::plate), sum(exact), 1e-6);
+  double squares = 0, all = 0;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    squares += std::pow(caustic.irradiance.values[i] * plate.pixel_area() - exact[i], 2);
+    all += exact[i] * exact[i];
+  }
+  return std::sqrt(squares / all);
+}
+
+constexpr int pixels = 64;
+
+Plate unit_plate() {
+  Plate plate;
+  plate.resolution = {pixels, pixels};
+  return plate;
+}
+
+/// A fold: x = c + k (u − ½)². The light of a column is the part of u that lands there, on both sides of the fold.
+double fold_error(int count) {
+  constexpr double c = 10.3, k = 160;
+  const FlowMap map = lattice_map(
+      count, [&](const Vector2d& at) { return Vector2d(c + k * (at.x() - 0.5) * (at.x() - 0.5), 5 + 50 * at.y()); });
+  std::vector<double> exact(pixels * pixels);
+  const auto below = [&](double x) { return 2 * std::sqrt(std::clamp((x - c) / k, 0.0, 0.25)); };
+  for (int y = 5; y < 55; ++y)
+    for (int x = 0; x < pixels; ++x)
+      exact[static_cast<std::size_t>(y) * pixels + static_cast<std::size_t>(x)] = (below(x + 1) - below(x)) / 50;
+  return distance(map, unit_plate(), exact);
+}
+
+TEST(Caustic, FoldHasItsClosedForm) {
+  EXPECT_LT(fold_error(128), 0.01);  // 16,384 rays.
+  EXPECT_LT(fold_error(64), 0.03);
+  EXPECT_LT(fold_error(256), fold_error(128) / 2);
+}
+
+/// A cusp: x = c + k (t³ + t (v − ½)), t = 2 (u − ½). For each v, the light between two places is the length of the set
+/// of t that lands there: the differences of the cubic's roots.
+double cusp_error(int count) {
+  constexpr double c = 32, k = 20;
+  const auto cubic = [](double t, double v) { return t * t * t + t * (v - 0.5); };
+  const FlowMap map = lattice_map(
+      count, [&](const Vector2d& at) { return Vector2d(c + k * cubic(2 * at.x() - 1, at.y()), 2 + 60 * at.y()); });
+  std::vector<double> exact(pixels * pixels);
+  constexpr int lines = 60 * 64;  // Of v; 64 for each row of pixels.
+  for (int line = 0; line < lines; ++line) {
+    const double v = (line + 0.5) / lines;
+    const auto row = static_cast<std::size_t>(2 + line / 64) * pixels;
+    // Monotone pieces in t, each inverted by bisection.
+    const double turn = v < 0.5 ? std::sqrt((0.5 - v) / 3) : 0;
+    for (const auto& [low, high] : {std::pair(-1.0, -turn), std::pair(-turn, turn), std::pair(turn, 1.0)}) {
+      if (low == high) continue;
+      const auto at = [&, low = low, high = high](double x) {
+        double a = low, b = high;
+        const bool rises = cubic(b, v) > cubic(a, v);
+        for (int i = 0; i < 40; ++i) ((c + k * cubic((a + b) / 2, v) < x) == rises ? a : b) = (a + b) / 2;
+        return a;
+      };
+      double before = at(0);
+      for (int x = 0; x < pixels; ++x) {
+        const double next = at(x + 1);
+        exact[row + static_cast<std::size_t>(x)] += std::abs(next - before) / 2 / lines;
+        before = next;
+      }
+    }
+  }
+  return distance(map, unit_plate(), exact);
+}
+
+TEST(Caustic, CuspHasItsClosedForm) {
+  EXPECT_LT(cusp_error(128), 0.01);  // 16,384 rays.
+  EXPECT_LT(cusp_error(256), cusp_error(128) / 2);
+}
+
+/// Away from folds the error is of second order in the size of the quads.
+TEST(Caustic, IsOfSecondOrderWhereNothingFolds) {
+  const auto error = [](int count) {
+    const FlowMap map = lattice_map(
+        count, [](const Vector2d& at) { return Vector2d(5 + 40 * (at.x() + 0.3 * at.x() * at.x()), 4 + 54 * at.y()); });
+    std::vector<double> exact(pixels * pixels);
+    const auto start = [](double x) {  // The inverse of the map.
+      const double s = std::clamp((x - 5) / 40, 0.0, 1.3);
+      return (std::sqrt(1 + 1.2 * s) - 1) / 0.6;
+    };
+    for (int y = 4; y < 58; ++y)
+      for (int x = 0; x < pixels; ++x)
+        exact[static_cast<std::size_t>(y) * pixels + static_cast<std::size_t>(x)] = (start(x + 1) - start(x)) / 54;
+    return distance(map, unit_plate(), exact);
+  };
+  const double coarse = error(128), fine = error(512);
+  EXPECT_LT(coarse, 1e-3);
+  EXPECT_LT(fine, coarse / 10);  // 16 for second order.
+}
+
+/// The light of one band between two samples, of which each vertex moves by `moves`, and that of many narrow bands.
+std::pair<Film, Film> swept_and_narrow(const std::function<Vector2d(const Vector2d&)>& moves, int bands) {
+  FlowMap map = lattice_map(8, [](const Vector2d& at) { return Vector2d(5 + 20 * at.x(), 5 + 40 * at.y()); });
+  std::vector<Eigen::Vector2f> landings;
+  for (std::size_t i = 0; i < map.starts.size(); ++i)
+    landings.insert(landings.end(), {map.landings[i], map.landings[i] + moves(map.starts[i]).cast<float>()});
+  map.landings = landings;
+  map.wavelengths = 2;
+  map.ends.assign(landings.size(), RayEnd::plate);
+  CausticBand whole;
+  whole.sample = 0.5;
+  whole.width = 1;
+  std::vector<CausticBand> narrow(bands);
+  for (int i = 0; i < bands; ++i) {
+    narrow[i].sample = (i + 0.5) / bands;
+    narrow[i].weight = 1.0 / bands;
+  }
+  const auto draw = [&](const std::vector<CausticBand>& each) {
+    const Caustic caustic = draw_caustic(map, unit_plate(), each, {1, true, 1}, Progress());
+    EXPECT_NEAR(all_power(caustic), 1, 1e-9);
+    return caustic.irradiance;
+  };
+  return {draw({whole}), draw(narrow)};
+}
+
+TEST(Caustic, ABandIsSweptInStepsOfAPixel) {
+  const auto [swept, narrow] = swept_and_narrow([](const Vector2d&) { return Vector2d(12.5, 3); }, 13);
+  for (std::size_t i = 0; i < swept.values.size(); ++i) ASSERT_NEAR(swept.values[i], narrow.values[i], 1e-9) << i;
+  // Triangles that move by a different number of pixels still meet.
+  const auto [bent, exact] = swept_and_narrow([](const Vector2d& at) { return Vector2d(14 * at.y(), 0); }, 400);
+  double squares = 0, all = 0;
+  for (std::size_t i = 0; i < bent.values.size(); ++i) {
+    squares += std::pow(bent.values[i] - exact.values[i], 2);
+    all += std::pow(exact.values[i], 2);
+  }
+  EXPECT_LT(std::sqrt(squares / all), 0.02);
+}
+
+/// Light of a wavelength that nobody sees has power, too.
+TEST(Caustic, LightWithoutColourHasPower) {
+  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 48));
+  const FlowMap map = map_of(bench, single(0.4));
+  const Caustic caustic = draw_caustic(map, bench.plate(), {CausticBand{}}, {1, false}, Progress());
+  EXPECT_EQ(sum(caustic.color.values), 0);
+  EXPECT_EQ(caustic.power, caustic_of(bench, map).power);
+  EXPECT_GT(power_of(caustic, RayEnd::plate), 0.5);
+}
+
+/// The picture does not depend on whether the channels' irradiance is wanted, and is what the channels add up to.
+TEST(Caustic, ChannelsAddUpToTheColours) {
+  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 96));
+  const FlowMap map = map_of(bench, range(0.1, 0.4));
+  constexpr std::size_t channels = 6, parts = 5;
+  std::vector<CausticBand> bands(channels * parts);
+  for (std::size_t i = 0; i < bands.size(); ++i) {
+    const double width = static_cast<double>(map.wavelengths - 1) / static_cast<double>(bands.size());
+    bands[i].sample = (static_cast<double>(i) + 0.5) * width;
+    bands[i].width = width;
+    bands[i].channel = i / parts;
+    bands[i].weight = 1.0 / parts;
+    bands[i].color = Eigen::Vector3d(1, 0.5, -0.1) * static_cast<double>(1 + i / parts) / parts;
+  }
+  const Caustic colors = draw_caustic(map, bench.plate(), bands, {channels, false}, Progress());
+  const Caustic both = draw_caustic(map, bench.plate(), bands, {channels, true}, Progress());
+  EXPECT_EQ(colors.color.values, both.color.values);
+  EXPECT_EQ(colors.power, both.power);
+  for (std::size_t channel = 0; channel < channels; ++channel)
+    EXPECT_NEAR(std::accumulate(both.power[channel].begin(), both.power[channel].end(), 0.0), 1, 1e-9);
+  for (std::size_t pixel = 0; pixel < both.color.plane_size(); ++pixel) {
+    double red = 0;
+    for (std::size_t channel = 0; channel < channels; ++channel)
+      red += static_cast<double>(channel + 1) * both.irradiance.plane(static_cast<int>(channel))[pixel];
+    ASSERT_NEAR(both.color.plane(0)[pixel], red, 1e-6 * (1 + red));
+    ASSERT_NEAR(both.color.plane(1)[pixel], 0.5 * red, 1e-6 * (1 + red));
+  }
+}
+
+/// Predicted wavelengths miss what traced ones hit by a little. That must not decide how a triangle is drawn: then the
+/// picture would change by much more.
+TEST(Caustic, ChangesByLittleIfLandingsDo) {
+  constexpr float change = 0.0025f;  // Pixels.
+  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 96));
+  FlowMap map = map_of(bench, range(0.1, 0.4));
+  std::vector<CausticBand> bands(128);
+  for (std::size_t i = 0; i < bands.size(); ++i) {
+    bands[i].width = static_cast<double>(map.wavelengths - 1) / static_cast<double>(bands.size());
+    bands[i].sample = (static_cast<double>(i) + 0.5) * bands[i].width;
+    bands[i].weight = 1.0 / static_cast<double>(bands.size());
+  }
+  const Film before = caustic_of(bench, map, bands).irradiance;
+  const std::size_t half = (map.wavelengths - 1) / 2;
+  for (std::size_t i = 0; i < map.landings.size(); ++i) {
+    const std::size_t vertex = i / map.wavelengths, sample = i % map.wavelengths;
+    const double angle = 2.4 * static_cast<double>(vertex);
+    if (sample % half != 0) map.landings[i] += change * Eigen::Vector2d(std::cos(angle), std::sin(angle)).cast<float>();
+  }
+  const Film after = caustic_of(bench, map, bands).irradiance;
+  // The sides of the smallest triangles, half a pixel long, change by up to a hundredth.
+  const double mean = sum(before.values) / static_cast<double>(before.values.size());
+  for (std::size_t i = 0; i < before.values.size(); ++i)
+    ASSERT_NEAR(after.values[i], before.values[i], 0.02 * (before.values[i] + mean)) << i;
+}
+
+TEST(Caustic, LightThatMovesFarHasManyBands) {
+  FlowMap map = lattice_map(2, [](const Vector2d& at) { return at; });
+  map.wavelengths = 2;
+  std::vector<Eigen::Vector2f> landings;
+  for (const Eigen::Vector2f& at : map.landings) landings.insert(landings.end(), {at, at + Eigen::Vector2f(21, 0)});
+  map.landings = landings;
+  map.ends.assign(landings.size(), RayEnd::plate);
+  EXPECT_EQ(band_count(map, 1), 21);
+  EXPECT_EQ(band_count(map, 4), 24);
+  EXPECT_EQ(band_count(map, 32), 32);
+  EXPECT_EQ(band_count(map, 1000), 1000);
+  for (std::size_t i = 1; i < map.landings.size(); i += 2) map.landings[i].x() += 1000;
+  EXPECT_EQ(band_count(map, 4), 128);
+}
+
+}  // namespace
+}  // namespace tensorray

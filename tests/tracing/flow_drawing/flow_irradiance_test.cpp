@@ -1,0 +1,311 @@
+#include "tracing/flow_drawing/flow_irradiance.h"
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "base/process/job.h"
+#include "base/process/progress.h"
+#include "renderer/light_maps/irradiance_map.h"
+#include "tests/base/rank_support.h"
+#include "tests/tracing/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+Plate floor_plate(double size) {
+  Plate plate;
+  plate.center = {0, 0, -1.5};
+  plate.size = {size, size};
+  plate.resolution = {64, 64};
+  return plate;
+}
+
+FlowIrradiance land(const TensorField& field, const LandingLight& light, const Plate& plate) {
+  const auto landed = flow_irradiance(field, surfaces_of(field), plate, light, {{}, 64, 20000}, {});
+  if (!landed) throw std::runtime_error("no light landed");
+  return *landed;
+}
+
+LandingLight sun(const Vector3d& direction) {
+  LandingLight light;
+  light.direction = direction.normalized();
+  light.flexibilities = {0.1, 0.2, 0.3};
+  return light;
+}
+
+TensorField bending_field() {
+  return cube_field(17, [](const Vector3d& p) {
+    Matrix3d T = Matrix3d::Zero();
+    T(0, 0) = p.x();
+    T(1, 0) = 0.5;
+    return T;
+  });
+}
+
+/// Irradiance times area, over the whole plate.
+double power(const FlowIrradiance& landed, int band) {
+  double sum = 0;
+  for (std::size_t i = 0; i < landed.irradiance.plane_size(); ++i) sum += landed.irradiance.plane(band)[i];
+  return sum * landed.plate.pixel_area();
+}
+
+TEST(FlowIrradianceTest, StraightLightFillsTheShadowOfTheVolume) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  const Vector3d direction(0.5, 0, -1);
+  const FlowIrradiance landed = land(field, sun(direction), floor_plate(12));
+  // The shadow is the hull of the bottom and the top of the cube, moved along the light.
+  const auto irradiance = [&](double x, double y) {
+    const Eigen::Vector2i at = landed.plate.to_pixel({x, y, -1.5}).array().floor().cast<int>();
+    if (at.minCoeff() < 0 || (at.array() >= landed.plate.resolution.array()).any()) return 0.0;
+    return landed.irradiance.plane(1)[at.y() * landed.irradiance.width + at.x()];
+  };
+  EXPECT_NEAR(irradiance(0.7, 0), -direction.normalized().z(), 2e-3);
+  EXPECT_NEAR(irradiance(-0.6, 0.9), -direction.normalized().z(), 2e-3);
+  EXPECT_EQ(irradiance(-0.85, 0), 0);
+  EXPECT_EQ(irradiance(0.7, 1.1), 0);
+  EXPECT_NEAR(power(landed, 0), 2 * 3 * -direction.normalized().z(), 0.01);
+}
+
+TEST(FlowIrradianceTest, BentLightKeepsItsPower) {
+  const TensorField field = bending_field();
+  LandingLight light = sun({0.2, 0.1, -1});
+  const double straight = 4 + 2 * (2 * 0.2 + 2 * 0.1);  // Area of the shadow.
+  for (const double angle : {0.0, 0.03}) {
+    light.angle = angle;
+    light.passes = 3;
+    const FlowIrradiance landed = land(field, light, floor_plate(40));
+    for (int band = 0; band < 2; ++band)
+      EXPECT_NEAR(power(landed, band), straight * -light.direction.z(), 0.01 * straight) << band;
+  }
+}
+
+TEST(FlowIrradianceTest, OfRanksAndOfEarlierRunsIsThatOfOneProcess) {
+  const TensorField field = cube_field(9, [](const Vector3d& p) { return Matrix3d(p.asDiagonal()); });
+  LandingLight light = sun({0.2, 0.1, -1});
+  light.angle = 0.03;
+  light.passes = 2;
+  const FlowIrradiance alone = land(field, light, floor_plate(8));
+  const auto expect_same = [&](Job& job) {
+    const auto landed = flow_irradiance(field, surfaces_of(field), floor_plate(8), light, {{}, 64, 20000, &job, 3}, {});
+    ASSERT_TRUE(landed);
+    EXPECT_EQ(landed->plate.center, alone.plate.center);
+    EXPECT_TRUE(landed->irradiance.values == alone.irradiance.values);
+    EXPECT_TRUE(landed->folds == alone.folds);
+  };
+  Results kept;
+  run_ranks(3, [&](Ranks& ranks) {
+    Job job;
+    job.ranks = &ranks;
+    job.interval = 1e-9;
+    expect_same(job);
+    if (is_root(&ranks)) kept = job.results();
+  });
+  EXPECT_EQ(kept.size(), 2u);  // A direction is a unit.
+  kept.erase(kept.begin());
+  Job resumed({}, kept);
+  expect_same(resumed);
+}
+
+LandingLight lamp(const Vector3d& source) {
+  LandingLight light = sun({0, 0, -1});
+  light.source = source;
+  return light;
+}
+
+/// The solid angle of the square from −1 to 1 at z = 1, as seen from a point above it.
+double solid_angle_of_top(const Vector3d& from) {
+  double sum = 0;
+  for (const double x : {1 - from.x(), 1 + from.x()})
+    for (const double y : {1 - from.y(), 1 + from.y()}) {
+      const double z = from.z() - 1;
+      sum += std::atan(x * y / (z * std::sqrt(x * x + y * y + z * z)));
+    }
+  return sum;
+}
+
+/// Light is even over each triangle, across which the irradiance changes by percents. Neighbours make up for this, but
+/// for a thousandth where quads of two sizes meet.
+TEST(FlowIrradianceTest, LightOfAPointFallsWithTheSquareOfTheDistance) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  const Vector3d source(0.3, 0.2, 4);
+  const FlowIrradiance landed = land(field, lamp(source), floor_plate(12));
+  std::vector<double> errors;
+  for (int y = 0; y < landed.irradiance.height; ++y)
+    for (int x = 0; x < landed.irradiance.width; ++x) {
+      const Vector3d point = landed.plate.to_world({x + 0.5, y + 0.5}), way = point - source;
+      const Vector3d on_top = source + 3 / 5.5 * way;  // Where straight light enters the cube.
+      const double edge = on_top.head<2>().cwiseAbs().maxCoeff();
+      if (std::abs(edge - 1) < 0.05) continue;
+      const double expected = edge < 1 ? 5.5 / std::pow(way.norm(), 3) : 0;
+      const double error = landed.irradiance.plane(0)[y * landed.irradiance.width + x] - expected;
+      EXPECT_LT(std::abs(error), 2e-3 * expected + 1e-9);
+      if (edge < 1) errors.push_back(std::abs(error) / expected);
+    }
+  EXPECT_LT(std::accumulate(errors.begin(), errors.end(), 0.0), 5e-4 * static_cast<double>(errors.size()));
+  EXPECT_NEAR(power(landed, 0), solid_angle_of_top(source), 1e-4 * solid_angle_of_top(source));
+}
+
+TEST(FlowIrradianceTest, BentLightOfAPointKeepsItsPower) {
+  const TensorField field = bending_field();
+  const Vector3d source(0.3, 0.2, 4);
+  const FlowIrradiance landed = land(field, lamp(source), floor_plate(40));
+  for (int band = 0; band < 2; ++band)
+    EXPECT_NEAR(power(landed, band), solid_angle_of_top(source), 0.01 * solid_angle_of_top(source)) << band;
+}
+
+TEST(FlowIrradianceTest, APointWithinTheVolumeIsRefused) {
+  EXPECT_THROW(land(constant_field(Matrix3d::Zero()), lamp({0.5, 0, 0}), floor_plate(12)), std::invalid_argument);
+}
+
+TEST(FlowIrradianceTest, IsTheSameOnAnyNumberOfThreads) {
+  const TensorField field = cube_field(17, linear_tensor);
+  std::vector<double> first;
+  for (const std::size_t threads : {1, 2, 7}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const FlowIrradiance landed = land(field, sun({0.2, 0.1, -1}), floor_plate(8));
+    if (first.empty()) first = landed.irradiance.values;
+    EXPECT_EQ(first, landed.irradiance.values) << threads;
+  }
+}
+
+/// A plane across the light, behind all of a body within 3 units of (0, 0, −2).
+Plate plane_behind(const Vector3d& direction) {
+  Plate plate;
+  plate.up = upright(direction, Vector3d::UnitY());
+  plate.right = plate.up.cross(-direction);
+  plate.center = Vector3d(0, 0, -2) + 4 * direction;
+  plate.size = {6, 6};
+  plate.resolution = {64, 64};
+  return plate;
+}
+
+std::optional<FlowIrradiance> land_on(const TriangleMesh& body, const TensorField& field, const LandingLight& light) {
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.body = body;
+  return flow_irradiance(field, surfaces, plane_behind(light.direction), light, {{}, 192, 40000}, {});
+}
+
+/// The irradiance, on a surface that faces the light, of a point.
+double irradiance_at(const FlowIrradiance& landed, int band, const Vector3d& point) {
+  const Eigen::Vector2i at = landed.plate.to_pixel(point).array().floor().cast<int>();
+  if (at.minCoeff() < 0 || (at.array() >= landed.plate.resolution.array()).any()) return 0;
+  return landed.irradiance.plane(band)[at.y() * landed.irradiance.width + at.x()];
+}
+
+TEST(FlowIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
+  const TensorField field = bending_field();
+  const LandingLight light = sun({0.2, 0.1, -1});
+  Plate plate = floor_plate(8);
+  const Vector3d normal = Vector3d(0.3, -0.2, 1).normalized();
+  plate.center = {0, 0, -2};
+  plate.up = upright(normal, Vector3d::UnitY());
+  plate.right = plate.up.cross(normal);
+  const FlowIrradiance flat = land(field, light, plate);
+  const auto body = land_on({plate.corners(), {{0, 1, 2}, {0, 2, 3}}}, field, light);
+  ASSERT_TRUE(body);
+  const double cosine = -normal.dot(light.direction);
+  for (const double x : {-0.5, 0.0, 0.4}) {  // Means over squares; within a triangle of the map light is even.
+    double with_body = 0, with_plate = 0;
+    for (int i = 0; i < 400; ++i) {
+      const Vector3d point = plate.center + (x + (i % 20 - 9.5) / 50) * plate.right + ((i / 20 - 9.5) / 50) * plate.up;
+      with_body += irradiance_at(*body, 0, point) * cosine / 400;
+      with_plate += irradiance_at(flat, 0, point) / 400;
+    }
+    EXPECT_NEAR(with_body, with_plate, 0.02) << x;
+  }
+  EXPECT_NEAR(power(*body, 0), power(flat, 0), 0.01 * power(flat, 0));
+}
+
+TEST(FlowIrradianceTest, ABodyHasAPointsLightOfAPlateInItsPlace) {
+  const TensorField field = bending_field();
+  const LandingLight light = lamp({0.5, 0.3, 4});
+  Plate plate = floor_plate(5);
+  const Vector3d normal = Vector3d(0.3, -0.2, 1).normalized();
+  plate.center = {0, 0, -2.2};
+  plate.up = upright(normal, Vector3d::UnitY());
+  plate.right = plate.up.cross(normal);
+  const FlowIrradiance flat = land(field, light, plate);
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.body = TriangleMesh{plate.corners(), {{0, 1, 2}, {0, 2, 3}}};
+  Plate behind = plane_behind((plate.center - *light.source).normalized());
+  behind.size = {16, 16};
+  const auto body = flow_irradiance(field, surfaces, behind, light, {{}, 192, 40000}, {});
+  ASSERT_TRUE(body);
+  const auto landed = [&](const FlowIrradiance& from, bool is_body) {
+    IrradianceMap result;
+    result.plate = from.plate;
+    result.source = light.source;
+    result.bands = 1;
+    ShadedSurface shown;
+    shown.shape = *surfaces.body;
+    if (is_body) result.body = std::make_shared<SurfaceScene>(std::vector{shown});
+    for (std::size_t i = 0; i < from.irradiance.plane_size(); ++i)
+      result.irradiance.push_back(static_cast<float>(from.irradiance.plane(0)[i]));
+    return result;
+  };
+  const IrradianceMap on_body = landed(*body, true), on_plate = landed(flat, false);
+  for (const double x : {-0.5, 0.0, 0.4}) {  // Means over squares; within a triangle of the map light is even.
+    Eigen::ArrayXd with_body = Eigen::ArrayXd::Zero(1), with_plate = with_body;
+    for (int i = 0; i < 400; ++i) {
+      const Vector3d point = plate.center + (x + (i % 20 - 9.5) / 50) * plate.right + ((i / 20 - 9.5) / 50) * plate.up;
+      Eigen::ArrayXd facing = Eigen::ArrayXd::Zero(1);
+      add_irradiance(on_body, point, facing);
+      with_body += normal.dot((*light.source - point).normalized()) * facing;
+      add_irradiance(on_plate, point, with_plate);
+    }
+    EXPECT_GT(with_plate[0], 4) << x;
+    EXPECT_NEAR(with_body[0], with_plate[0], 0.02 * with_plate[0]) << x;
+  }
+}
+
+TEST(FlowIrradianceTest, OnlyTheFirstLayerOfABodyHasLight) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  const auto square = [](double x, double z, std::uint32_t first, TriangleMesh& mesh) {
+    for (const auto& [a, b] : {std::pair{-0.25, -0.25}, {0.25, -0.25}, {0.25, 0.25}, {-0.25, 0.25}})
+      mesh.vertices.emplace_back(x + a, b, z);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    mesh.triangles.push_back({first, first + 2, first + 3});
+  };
+  TriangleMesh body;  // The second square is below the first, half of the third is.
+  square(0, -2, 0, body);
+  square(0, -2.5, 4, body);
+  square(0.25, -2.25, 8, body);
+  const auto landed = land_on(body, field, sun({0, 0, -1}));
+  ASSERT_TRUE(landed);
+  EXPECT_NEAR(irradiance_at(*landed, 0, {0, 0, 0}), 1, 2e-3);
+  EXPECT_NEAR(irradiance_at(*landed, 0, {0.35, 0, 0}), 1, 2e-3);
+  EXPECT_NEAR(power(*landed, 0), 0.75 * 0.5, 0.005);
+}
+
+TEST(FlowIrradianceTest, LightThatMeetsABodyBeforeTheVolumeIsNotCounted) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  TriangleMesh body;  // Above the left half of the volume, and below its right half.
+  for (const double x : {-1.0, 0.0})
+    for (const auto& [a, b] : {std::pair{0.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {0.0, 1.0}})
+      body.vertices.emplace_back(x + a, b, x < 0 ? 1.5 : -1.5);
+  body.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+  const auto landed = land_on(body, field, sun({0, 0, -1}));
+  ASSERT_TRUE(landed);
+  EXPECT_EQ(irradiance_at(*landed, 0, {-0.5, 0, 0}), 0);
+  EXPECT_NEAR(irradiance_at(*landed, 0, {0.5, 0, 0}), 1, 2e-3);
+  EXPECT_NEAR(power(*landed, 0), 2, 0.02);
+}
+
+TEST(FlowIrradianceTest, LightThatGoesAwayFromAPlateDoesNotLand) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  EXPECT_FALSE(flow_irradiance(field, surfaces_of(field), floor_plate(12), sun({0, 0, 1}), {{}, 64, 20000}, {}));
+}
+
+}  // namespace
+}  // namespace tensorray

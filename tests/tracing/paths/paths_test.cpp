@@ -1,0 +1,391 @@
+#include "tracing/paths/paths.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+#include <tbb/task_arena.h>
+
+#include "base/process/job.h"
+#include "renderer/surfaces/tube_mesh.h"
+#include "tests/base/rank_support.h"
+#include "tests/tracing/path_support.h"
+#include "tests/tracing/support.h"
+#include "tracing/paths/cross_section.h"
+#include "tracing/steps/scalar_tracer.h"
+#include "tracing/trace/trace.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+PathSettings everything() {
+  PathSettings settings;
+  settings.tolerance = settings.tensor_tolerance = 0;
+  return settings;
+}
+
+Path trace_one_path(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
+                    const PathSeed& seed, const PathSettings& settings) {
+  const Geometry geometry{Surfaces(surfaces)};
+  return trace_paths(field, geometry, bending, {seed}, settings, Progress()).at(0);
+}
+
+Path trace_one_path(const TensorField& field, const PathSeed& seed, const PathSettings& settings,
+                    const BendingSettings& bending = {}) {
+  return trace_one_path(field, surfaces_of(field), bending, seed, settings);
+}
+
+PathSeed seed_at(const Vector3d& position, double flexibility = 0.5, const Vector3d& direction = {0, 0, -1}) {
+  PathSeed seed;
+  seed.position = position;
+  seed.direction = direction.normalized();
+  seed.flexibility = flexibility;
+  return seed;
+}
+
+double distance_to_segment(const Vector3d& point, const Vector3d& a, const Vector3d& b) {
+  const double t = std::clamp((point - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+  return (a + t * (b - a) - point).norm();
+}
+
+/// The greatest distance of one of `points` from the polyline `other`.
+double distance(const PathPoints& points, const PathPoints& other) {
+  double greatest = 0;
+  for (const PathPoint& point : points) {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 1; i < other.size(); ++i)
+      least = std::min(least, distance_to_segment(point.position, other[i - 1].position, other[i].position));
+    greatest = std::max(greatest, least);
+  }
+  return greatest;
+}
+
+TEST(Paths, AnIsotropicFieldGivesStraightPathsOfTwoPoints) {
+  const TensorField field = constant_field(3 * Matrix3d::Identity());
+  const Vector3d V = Vector3d(0.1, -0.2, -1).normalized();
+  const Path path = trace_one_path(field, seed_at({0.1, 0.2, 2}, 0.5, V), {});
+  ASSERT_EQ(path.points.size(), 2u);
+  EXPECT_NEAR(path.points[0].position.z(), 1, 1e-12);
+  EXPECT_NEAR(path.points[1].position.z(), -1, 1e-9);
+  EXPECT_EQ(path.points[0].length, 0);
+  EXPECT_NEAR(path.points[1].length, 2 / -V.z(), single_precision);
+  for (const PathPoint& point : path.points) {
+    EXPECT_LT((point.direction - V).norm(), single_precision);
+    EXPECT_LT((point.force() - 3 * V).norm(), 1e-6);
+    EXPECT_LT(point.change.norm(), 1e-12);
+  }
+}
+
+TEST(Paths, RecordsWhatTheRayDoesWithoutChangingIt) {
+  const TensorField field = cube_field(9, linear_tensor);
+  for (const BendingMethod method : {BendingMethod::splitting, BendingMethod::dopri5}) {
+    const Geometry geometry(surfaces_of(field));
+    RayBatch plain, recorded;
+    std::vector<RayRecord> records;
+    for (RayBatch* batch : {&plain, &recorded}) batch->add({0.2, -0.1, 2}, {0, 0, -1}, 0.5);
+    const BendingSettings bending = settings_of(method, 0);
+    trace(field, geometry, bending, plain);
+    trace(field, geometry, bending, recorded, &records);
+    EXPECT_EQ(plain.position[0], recorded.position[0]);
+    EXPECT_EQ(plain.steps[0], recorded.steps[0]);
+    ASSERT_EQ(records.size(), 1u);
+    const PathPoints points = points_of(field, records[0]);
+    EXPECT_EQ(points.back().position, recorded.position[0]);
+    EXPECT_EQ(points.back().length, recorded.length[0]);
+    // Points are the two ends of the path, the entry into the field, and the steps. Only `splitting` never repeats a
+    // step.
+    if (method == BendingMethod::splitting) {
+      EXPECT_EQ(points.size(), 3 + recorded.steps[0]);
+    }
+  }
+}
+
+/// Packets take the steps of the reference, in single precision.
+TEST(Paths, RecordsTheStepsOfTheReference) {
+  const TensorField field = cube_field(33, linear_tensor);
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate_across({0, 0, -1}, 1.5);
+  surfaces.obstacles.push_back(
+      box_mesh(Eigen::AlignedBox3d(Vector3d(0.3, -1, -0.6), Vector3d(1, 1, -0.2)), Eigen::Affine3d::Identity()));
+  const Geometry geometry(std::move(surfaces));
+  RayBatch batch;
+  for (int i = 0; i < 40; ++i) batch.add({0.05 * i - 1, 0.3, i % 4 == 0 ? 0.2 : 2.0}, {0, 0, -1}, 0.02 * i);
+  const RayBatch starts = batch;
+  std::vector<RayRecord> records;
+  trace(field, geometry, {}, batch, &records);
+  int on_obstacle = 0;
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const BendingSettings settings;
+    PathPoints expected;
+    Tracer<1> reference(field, geometry, settings);
+    const RayEnd end = reference.trace({starts.position[i], starts.direction[i], 0}, starts.flexibility[i], &expected);
+    ASSERT_EQ(batch.end[i], end);
+    on_obstacle += end == RayEnd::obstacle ? 1 : 0;
+    const PathPoints points = points_of(field, records[i]);
+    ASSERT_EQ(points.size(), expected.size()) << i;
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_EQ(points[k].in_field, expected[k].in_field);
+      EXPECT_LT((points[k].position - expected[k].position).norm(), 10 * single_precision);
+      EXPECT_LT((points[k].direction - expected[k].direction).norm(), 10 * single_precision);
+      EXPECT_NEAR(points[k].direction.norm(), 1, 1e-12);
+      EXPECT_NEAR(points[k].length, expected[k].length, 10 * single_precision);
+    }
+  }
+  EXPECT_GT(on_obstacle, 5);
+}
+
+TEST(Paths, PointsCarryTheTensorAndTheCurvature) {
+  const TensorField field = cube_field(9, linear_tensor);
+  const double s = 0.7;
+  BendingSettings settings = settings_of(BendingMethod::rk4, 1.0 / 32);
+  settings.scale = -2.5;  // The tensors of the points do not contain the scale.
+  const Path path = trace_one_path(field, seed_at({0.2, -0.1, 2}, s / settings.scale), everything(), settings);
+  ASSERT_GT(path.points.size(), 100u);
+  for (std::size_t i = 0; i < path.points.size(); ++i) {
+    const PathPoint& point = path.points[i];
+    const Matrix3d T = linear_tensor(point.position);
+    const Vector3d V = point.direction;
+    EXPECT_LT((point.tensor - T).norm(), 1e-6);
+    EXPECT_LT((point.force() - T * V).norm(), 1e-6);
+    EXPECT_LT((point.change - s * (T * V - V.dot(T * V) * V)).norm(), 1e-6);
+    if (i == 0 || i + 2 >= path.points.size()) continue;
+    // The curvature of the polyline itself: the error of a central difference with h = 1/128 is h² |V'''| / 6, about
+    // 1e-5 · 10.
+    const PathPoint &before = path.points[i - 1], &behind = path.points[i + 1];
+    const Vector3d measured = (behind.direction - before.direction) / (behind.length - before.length);
+    EXPECT_LT((measured - point.change).norm(), 2e-4);
+  }
+}
+
+TEST(Paths, AnIsotropicPartChangesTheEllipsesButNotThePaths) {
+  const Matrix3d isotropic = 2 * Matrix3d::Identity();
+  const TensorField plain = cube_field(9, linear_tensor);
+  const TensorField shifted = cube_field(9, [&](const Vector3d& p) { return Matrix3d(linear_tensor(p) + isotropic); });
+  const auto trace_it = [](const TensorField& field) {
+    return trace_one_path(field, seed_at({0.2, -0.1, 2}), everything(), settings_of(BendingMethod::rk4, 0.125));
+  };
+  const Path a = trace_it(plain), b = trace_it(shifted);
+  ASSERT_EQ(a.points.size(), b.points.size());
+  for (std::size_t i = 0; i < a.points.size(); ++i) {
+    const PathPoint &p = a.points[i], &q = b.points[i];
+    EXPECT_LT((p.position - q.position).norm(), 1e-5);  // Single precision of the voxels.
+    EXPECT_LT((q.force() - p.force() - 2 * p.direction).norm(), 1e-4);
+    EXPECT_GT(
+        (ellipse(p.tensor, p.direction).colwise().norm() - ellipse(q.tensor, q.direction).colwise().norm()).norm(),
+        0.1);
+  }
+}
+
+TEST(Paths, BackwardsAndForwardsIsThePathFromItsStart) {
+  const TensorField field = cube_field(17, linear_tensor);
+  const BendingSettings bending = settings_of(BendingMethod::rk4, 0.125);
+  for (const double s : {0.8, -0.8}) {
+    const Path whole = trace_one_path(field, seed_at({0.2, -0.1, 2}, s), everything(), bending);
+    for (const double fraction : {0.0, 0.3, 0.5, 0.9}) {
+      const PathPoint& middle = whole.points[static_cast<std::size_t>(fraction * double(whole.points.size()))];
+      const Path joined = trace_one_path(field, seed_at(middle.position, s, middle.direction), everything(), bending);
+      // rk4's error is far below the chords' h² |V'| / 8 = 1e-4.
+      EXPECT_LT(distance(joined.points, whole.points), 3e-4);
+      EXPECT_LT(distance(whole.points, joined.points), 3e-4);
+      EXPECT_LT((joined.points.front().position - whole.points.front().position).norm(), 1e-5);
+      EXPECT_LT((joined.points.front().direction - whole.points.front().direction).norm(), 1e-5);
+      EXPECT_LT((joined.points.back().position - whole.points.back().position).norm(), 1e-5);
+      EXPECT_NEAR(joined.points.back().length, whole.points.back().length, 1e-5);
+      for (std::size_t i = 1; i < joined.points.size(); ++i) {
+        EXPECT_GT(joined.points[i].length, joined.points[i - 1].length);
+        EXPECT_GT(joined.points[i].direction.dot(joined.points[i - 1].direction), 0.9);
+      }
+    }
+  }
+}
+
+TEST(Paths, ThinningKeepsItsTolerances) {
+  const TensorField field = cube_field(17, linear_tensor);
+  const PathSeed seed = seed_at({0.2, -0.1, 2}, 2);
+  PathSettings settings;
+  settings.tolerance = 0.02;
+  settings.tensor_tolerance = 0.05;
+  const Path all = trace_one_path(field, seed, everything()), few = trace_one_path(field, seed, settings);
+  EXPECT_LT(few.points.size(), all.points.size() / 2);
+  EXPECT_LE(distance(all.points, few.points), settings.tolerance * voxel_size(field));
+  std::size_t next = 0;
+  for (const PathPoint& point : all.points) {
+    while (few.points[next + 1].length < point.length) ++next;
+    const PathPoint &a = few.points[next], &b = few.points[next + 1];
+    const double t = (point.length - a.length) / (b.length - a.length);
+    const double greatest = std::max({a.tensor.norm(), b.tensor.norm(), point.tensor.norm()});
+    EXPECT_LE((a.tensor + t * (b.tensor - a.tensor) - point.tensor).norm(),
+              1.0001 * settings.tensor_tolerance * greatest);
+  }
+}
+
+TEST(Paths, WithoutTensorsFewerPointsHaveTheSamePositions) {
+  const TensorField field =
+      cube_field(65, [](const Vector3d& p) { return Matrix3d(std::exp(2 * p.z()) * linear_tensor(p)); });
+  const PathSeed seed = seed_at({0.2, -0.1, 0.3}, 0.1);
+  PathSettings settings;
+  const Path with = trace_one_path(field, seed, settings), all = trace_one_path(field, seed, everything());
+  settings.tensors = false;
+  const Path without = trace_one_path(field, seed, settings);
+  EXPECT_LT(without.points.size(), with.points.size());
+  EXPECT_GT(without.points.size(), 3u);
+  EXPECT_LE(distance(all.points, without.points), settings.tolerance * voxel_size(field));
+  EXPECT_EQ(without.points.front().position, all.points.front().position);
+  EXPECT_EQ(without.points.back().length, all.points.back().length);
+  std::size_t next = 0;
+  for (const PathPoint& point : without.points) {
+    EXPECT_TRUE(point.tensor.isZero(0) && point.change.isZero(0));
+    while (next < all.points.size() && all.points[next].position != point.position) ++next;
+    ASSERT_LT(next, all.points.size()) << "every point is one of the ray";
+    EXPECT_EQ(point.direction, all.points[next].direction);
+  }
+}
+
+TEST(Paths, AreTheSameOnAnyNumberOfThreads) {
+  const TensorField field = cube_field(33, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  std::vector<PathSeed> seeds;
+  for (int i = 0; i < 300; ++i)
+    seeds.push_back(seed_at({std::sin(1.0 * i), std::cos(1.7 * i), 0.9 * std::sin(2.3 * i)}, 0.002 * i));
+  std::vector<std::vector<Path>> traced;
+  for (const int threads : {1, 2, 7})
+    tbb::task_arena(threads).execute(
+        [&] { traced.push_back(trace_paths(field, geometry, {}, seeds, {}, Progress())); });
+  for (std::size_t n = 1; n < traced.size(); ++n)
+    for (std::size_t i = 0; i < seeds.size(); ++i) {
+      ASSERT_EQ(traced[n][i].points.size(), traced[0][i].points.size());
+      for (std::size_t k = 0; k < traced[0][i].points.size(); ++k) {
+        ASSERT_EQ(traced[n][i].points[k].position, traced[0][i].points[k].position);
+        ASSERT_EQ(traced[n][i].points[k].tensor, traced[0][i].points[k].tensor);
+        ASSERT_EQ(traced[n][i].points[k].length, traced[0][i].points[k].length);
+      }
+    }
+}
+
+TEST(Paths, KeepsTheStraightPartsOnRequestAndSeparatesTheFaces) {
+  const TensorField field = constant_field(general_tensor());
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate_across({0, 0, -1}, 1.5);
+  PathSettings settings;
+  const Path inside = trace_one_path(field, surfaces, {}, seed_at({0, 0, 2}), settings);
+  settings.outside = true;
+  const Path whole = trace_one_path(field, surfaces, {}, seed_at({0, 0, 2}), settings);
+
+  EXPECT_EQ(inside.end, RayEnd::plate);
+  EXPECT_EQ(inside.backward_end, RayEnd::missed);
+  for (const PathPoint& point : inside.points) EXPECT_TRUE(point.in_field);
+  ASSERT_EQ(whole.points.size(), inside.points.size() + 4);
+  const PathPoints& points = whole.points;
+  const auto straight = [](const PathPoint& p) { return !p.in_field && p.tensor.isZero() && p.change.isZero(); };
+  for (const std::size_t i : {std::size_t{0}, std::size_t{1}, points.size() - 2, points.size() - 1})
+    EXPECT_TRUE(straight(points[i])) << i;
+  EXPECT_NEAR(points[0].position.z(), 2, 1e-12);
+  EXPECT_NEAR(points[2].position.z(), 1, 1e-12);
+  EXPECT_NEAR(points.back().position.z(), -1.5, 1e-9);
+  const double gap = settings.tolerance * voxel_size(field);
+  EXPECT_GT(points[2].length - points[1].length, 0);
+  EXPECT_LT(points[2].length - points[1].length, gap);
+  EXPECT_LT(points[points.size() - 2].length - points[points.size() - 3].length, gap);
+}
+
+TEST(Paths, ACutLeavesAStraightPieceWithin) {
+  const TensorField field = constant_field(general_tensor());
+  Surfaces surfaces = surfaces_of(field);
+  // Two boxes, so that light leaves one and enters the other.
+  TriangleMesh cut = box_mesh({Vector3d(-2, -2, 0.4), Vector3d(2, 2, 0.8)}, Eigen::Affine3d::Identity());
+  const TriangleMesh lower = box_mesh({Vector3d(-2, -2, -0.8), Vector3d(2, 2, -0.4)}, Eigen::Affine3d::Identity());
+  const auto offset = static_cast<std::uint32_t>(cut.vertices.size());
+  cut.vertices.insert(cut.vertices.end(), lower.vertices.begin(), lower.vertices.end());
+  for (const auto& t : lower.triangles) cut.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+  surfaces.cut = cut;
+  const Path path = trace_one_path(field, surfaces, {}, seed_at({0, 0, 2}, 0.1), {});
+  ASSERT_GT(path.points.size(), 5u);
+  EXPECT_NEAR(path.points.front().position.z(), 0.8, 1e-9);
+  EXPECT_NEAR(path.points.back().position.z(), -0.8, 1e-9);
+  int straight = 0;
+  for (std::size_t i = 0; i < path.points.size(); ++i) {
+    EXPECT_TRUE(i == 0 || path.points[i].length > path.points[i - 1].length);
+    EXPECT_EQ(path.points[i].in_field, std::abs(path.points[i].position.z()) > 0.4 - 1e-9);
+    straight += !path.points[i].in_field;
+  }
+  EXPECT_EQ(straight, 2);
+}
+
+TEST(Paths, AStraightFieldMakesStraightCircularTubes) {
+  const Matrix3d T = Vector3d(2, 2, 5).asDiagonal();
+  const TensorField field = constant_field(T);
+  const Path path = trace_one_path(field, seed_at({0.3, -0.2, 2}, 3), {});
+  ASSERT_EQ(path.points.size(), 2u);
+  CrossSectionSettings sizes;
+  sizes.scale = 0.05;
+  sizes.least_radius = 1e-3;
+  Tube tube;
+  for (const CrossSection& section : cross_sections(path.points, sizes))
+    tube.push_back({path.points[tube.size()].position, section.x, section.y, 0});
+  const TubeMesh tubes = make_tube_mesh({tube}, {});
+  EXPECT_GT(tubes.mesh.vertices.size(), 2u * 6);
+  for (const Vector3d& p : tubes.mesh.vertices) EXPECT_NEAR(std::hypot(p.x() - 0.3, p.y() + 0.2), 0.1, 1e-7);
+  EXPECT_NEAR(tubes.mesh.bounds().max().z(), 1, 1e-9);
+  EXPECT_NEAR(tubes.mesh.bounds().min().z(), -1, 1e-9);
+}
+
+/// More than one round of them.
+TEST(Paths, OfRanksAreThoseOfOneProcess) {
+  const TensorField field = cube_field(5, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  std::vector<PathSeed> seeds;
+  for (int i = 0; i < 5000; ++i) seeds.push_back(seed_at({std::sin(1.0 * i), std::cos(1.7 * i), 2}, 2e-5 * i));
+  const std::vector<Path> alone = trace_paths(field, geometry, {}, seeds, {}, Progress());
+  std::vector<std::vector<Path>> paths(3);
+  run_ranks(paths.size(), [&](Ranks& ranks) {
+    Job job;
+    job.ranks = &ranks;
+    PathSettings settings;
+    settings.job = &job;
+    paths[ranks.rank()] = trace_paths(field, geometry, {}, seeds, settings, Progress());
+  });
+  for (const std::vector<Path>& each : paths) expect_same(each, alone);
+}
+
+TEST(Paths, OnePathASeedInTheirOrder) {
+  const TensorField field = cube_field(9, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  std::vector<PathSeed> seeds;
+  for (int i = 0; i < 50; ++i) seeds.push_back(seed_at({0.05 * i - 1.2, 0.1, 2}, 0.01 * i));
+  PathSettings settings;
+  settings.backwards = false;
+  const std::vector<Path> paths = trace_paths(field, geometry, {}, seeds, settings, Progress());
+  ASSERT_EQ(paths.size(), seeds.size());
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    EXPECT_EQ(paths[i].flexibility, seeds[i].flexibility);
+    EXPECT_FALSE(paths[i].backward_end.has_value());
+    EXPECT_EQ(paths[i].end, RayEnd::missed);
+    const bool meets = std::abs(seeds[i].position.x()) < 1;
+    ASSERT_EQ(paths[i].points.size() >= 2, meets);
+    if (meets) {
+      EXPECT_NEAR(paths[i].points[0].position.x(), seeds[i].position.x(), 1e-12);
+    }
+  }
+}
+
+TEST(Paths, StopsWhenCancelledAndRefusesNegativeTolerances) {
+  const TensorField field = constant_field(general_tensor());
+  const Geometry geometry(surfaces_of(field));
+  Progress progress;
+  progress.cancelled = true;
+  EXPECT_THROW(trace_paths(field, geometry, {}, {seed_at({0, 0, 2})}, {}, progress), Cancelled);
+  PathSettings settings;
+  settings.tolerance = -1;
+  EXPECT_THROW(trace_paths(field, geometry, {}, {}, settings, Progress()), std::invalid_argument);
+  settings = {};
+  settings.tensor_tolerance = std::nan("");
+  EXPECT_THROW(trace_paths(field, geometry, {}, {}, settings, Progress()), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,119 @@
+#pragma once
+/// @file tests/tracing/support.h
+/// Small fields and scenes for the tests of the integrators.
+
+#include <functional>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "renderer/meshes/mesh.h"
+#include "tracing/bending/bending.h"
+#include "tracing/trace/trace.h"
+#include "volumes/bricks/tensor_field.h"
+
+namespace tensorray::test {
+
+/// The accepted difference of `trace` from exact arithmetic, in the units of these fields, whose edges are 2: half a
+/// unit in the last place of single precision, for each of about ten steps.
+constexpr double single_precision = 5e-7;
+
+using TensorFunction = std::function<Eigen::Matrix3d(const Eigen::Vector3d&)>;
+
+/// A grid of `voxels` centres along each axis of the cube [-1, 1]³, moved by `placement`; `tensor` takes world
+/// positions.
+inline TensorGrid cube_grid(const Eigen::Vector3i& voxels, const TensorFunction& tensor,
+                            const Eigen::Affine3d& placement = Eigen::Affine3d::Identity()) {
+  Eigen::Affine3d to_cube = Eigen::Affine3d::Identity();
+  to_cube.translation().setConstant(-1);
+  to_cube.linear() = (2.0 / (voxels.array() - 1).cast<double>()).matrix().asDiagonal();
+  const Eigen::Affine3d to_world = placement * to_cube;
+  return dense_grid(Eigen::AlignedBox3i(Eigen::Vector3i::Zero(), Eigen::Vector3i(voxels.array() - 1)), to_world,
+                    [&](const Eigen::Vector3i& index) { return tensor(to_world * index.cast<double>()); });
+}
+
+inline TensorField cube_field(int voxels, const TensorFunction& tensor,
+                              const Eigen::Affine3d& placement = Eigen::Affine3d::Identity()) {
+  return TensorField(cube_grid(Eigen::Vector3i::Constant(voxels), tensor, placement));
+}
+
+inline TensorField constant_field(const Eigen::Matrix3d& tensor) {
+  return cube_field(9, [&](const Eigen::Vector3d&) { return tensor; });
+}
+
+/// The edge of a voxel, world units, of a field whose voxels are cubes.
+inline double voxel_size(const TensorField& field) { return field.to_world().linear().col(0).norm(); }
+
+inline Surfaces surfaces_of(const TensorField& field) {
+  Surfaces surfaces;
+  surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
+  return surfaces;
+}
+
+/// A large plate at `distance` from the origin along `direction`, across it.
+inline Plate plate_across(const Eigen::Vector3d& direction, double distance) {
+  Plate plate;
+  const Eigen::Vector3d normal = -direction.normalized();
+  plate.center = -distance * normal;
+  plate.up = upright(normal, Eigen::Vector3d::UnitY());
+  plate.right = plate.up.cross(normal);
+  plate.size = {40, 40};
+  return plate;
+}
+
+struct Ray {
+  Eigen::Vector3d position, direction;
+  RayEnd end = RayEnd::missed;
+  std::uint32_t steps = 0;
+};
+
+/// Traces with the reference: these tests check its mathematics in double precision, and packet_kernel_test.cpp
+/// compares `trace` with it.
+inline Ray trace_one(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                     const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility) {
+  RayBatch batch;
+  batch.add(position, direction.normalized(), flexibility);
+  trace_reference(field, geometry, settings, batch);
+  return {batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]};
+}
+
+/// All points of a ray.
+inline PathPoints points_of(const TensorField& field, const RayRecord& record) {
+  PathPoints points;
+  for (std::size_t i = 0; i < record.size(); ++i) points.push_back(path_point(field, record, i));
+  return points;
+}
+
+/// Follows a ray for exactly `steps` steps. For cubic voxels it is then at the arc length steps · step · voxel_size.
+inline Ray trace_steps(const TensorField& field, BendingSettings settings, int steps, const Eigen::Vector3d& position,
+                       const Eigen::Vector3d& direction, double flexibility) {
+  settings.max_steps = steps;
+  const Ray ray = trace_one(field, Geometry(surfaces_of(field)), settings, position, direction, flexibility);
+  EXPECT_EQ(ray.end, RayEnd::step_limit) << "the ray left the field before its steps were used up";
+  return ray;
+}
+
+inline BendingSettings settings_of(BendingMethod method, double step) {
+  BendingSettings settings;
+  settings.method = method;
+  settings.step = step;
+  return settings;
+}
+
+/// A tensor without any symmetry, its entries short binary fractions, so that single precision holds them exactly.
+inline Eigen::Matrix3d general_tensor() {
+  Eigen::Matrix3d T;
+  T << 0.5, -1.25, 0.375, 0.75, -0.5, 1.0, -0.25, 0.625, 0.25;
+  return T;
+}
+
+/// A field that is linear in position, which trilinear interpolation reproduces exactly: smooth data on a grid.
+inline Eigen::Matrix3d linear_tensor(const Eigen::Vector3d& p) {
+  Eigen::Matrix3d x, y, z;
+  x << 0.5, 0.25, -0.75, 1.0, 0.25, 0.5, -0.5, 0.125, 0.75;
+  y << -0.25, 0.5, 0.5, -0.75, 1.0, 0.25, 0.25, -0.5, 0.5;
+  z << 0.75, -0.5, 0.25, 0.5, -0.25, 1.0, 1.25, 0.25, -0.5;
+  return general_tensor() + p.x() * x + p.y() * y + p.z() * z;
+}
+
+}  // namespace tensorray::test

@@ -1,0 +1,226 @@
+// Rays in cubic fields, against rays through the formula that the voxels were sampled from.
+
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+#include <unsupported/Eigen/MatrixFunctions>
+
+#include "tests/tracing/support.h"
+#include "tracing/trace/trace.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr Interpolant cubic{Interpolation::cubic, Border::fade}, linear{Interpolation::linear, Border::fade};
+
+/// A field that no generator makes: a rotation that varies like waves, and a stretch along a bump.
+Matrix3d formula(const Vector3d& p) {
+  Matrix3d T = 0.8 * std::sin(2.1 * p.x() + 0.5 * p.z()) * general_tensor();
+  const Vector3d axis(0.6, -0.48, 0.64);
+  T += 1.2 * std::exp(-2 * (p - Vector3d(0.1, -0.2, 0.15)).squaredNorm()) * axis * axis.transpose();
+  T(0, 1) += 0.5 * std::cos(1.7 * p.y() - p.z());
+  T(1, 0) -= 0.4 * std::cos(1.7 * p.y() - p.z());
+  return T;
+}
+
+/// A polynomial of degree 3 along each axis, which a cubic field is everywhere.
+Matrix3d cubic_polynomial(const Vector3d& p) {
+  Matrix3d T = linear_tensor(p);
+  T += 0.5 * p.x() * p.x() * p.y() * general_tensor().transpose();
+  T(2, 0) += 0.3 * p.z() * p.z() * p.z() - 0.4 * p.x() * p.x() * p.x();
+  T(1, 2) += 0.2 * p.y() * p.y() * p.y() * p.z() * p.z();
+  return T;
+}
+
+/// A ray through a formula, by the classical Runge–Kutta method with steps far below what tests measure.
+Ray through_formula(const std::function<Matrix3d(const Vector3d&)>& T, double s, Vector3d P, Vector3d V,
+                    double length) {
+  constexpr int steps = 4000;
+  const double h = length / steps;
+  const auto bend = [&](const Vector3d& at, const Vector3d& v) {
+    const Vector3d Tv = T(at) * v;
+    return Vector3d(s * (Tv - v.dot(Tv) / v.squaredNorm() * v));
+  };
+  for (int i = 0; i < steps; ++i) {
+    const Vector3d k1 = bend(P, V), v2 = V + h / 2 * k1, k2 = bend(P + h / 2 * V, v2), v3 = V + h / 2 * k2,
+                   k3 = bend(P + h / 2 * v2, v3), v4 = V + h * k3, k4 = bend(P + h * v3, v4);
+    P += h / 6 * (V + 2 * v2 + 2 * v3 + v4);
+    V = (V + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)).normalized();
+  }
+  return {P, V};
+}
+
+struct Start {
+  Vector3d position, direction;
+};
+
+std::vector<Start> starts() {
+  std::vector<Start> result;
+  for (int i = 0; i < 6; ++i)
+    result.push_back({Vector3d(-0.4 + 0.15 * i, 0.3 - 0.13 * i, -0.6), Vector3d(0.1 * i - 0.3, 0.1, 1).normalized()});
+  return result;
+}
+
+constexpr double way = 1, flexibility = 0.6;  // Within the field.
+
+BendingSettings settings_for(BendingMethod method, double step) {
+  BendingSettings settings = settings_of(method, step);
+  settings.max_length = way;
+  return settings;
+}
+
+/// The greatest distance of rays' ends, one unit further along their directions, from those of other rays.
+double distance(const TensorField& field, const BendingSettings& settings, const std::vector<Ray>& truth) {
+  const Geometry geometry(surfaces_of(field));
+  double greatest = 0;
+  const std::vector<Start> from = starts();
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const Ray ray = trace_one(field, geometry, settings, from[i].position, from[i].direction, flexibility);
+    const Vector3d apart = ray.position + ray.direction - truth[i].position - truth[i].direction;
+    greatest = std::max(greatest, apart.norm());
+  }
+  return greatest;
+}
+
+std::vector<Ray> true_rays(const std::function<Matrix3d(const Vector3d&)>& T) {
+  std::vector<Ray> rays;
+  for (const Start& start : starts())
+    rays.push_back(through_formula(T, flexibility, start.position, start.direction, way));
+  return rays;
+}
+
+TensorField field_of(const std::function<Matrix3d(const Vector3d&)>& T, int voxels, const Interpolant& interpolant) {
+  return TensorField(cube_grid(Eigen::Vector3i::Constant(voxels), T), interpolant);
+}
+
+/// Halving the step divides the error by 2⁴ where the field is one polynomial.
+TEST(CubicRays, StepsAreOfOrderFour) {
+  const TensorField field = field_of(cubic_polynomial, 9, cubic);
+  const std::vector<Ray> truth = true_rays(cubic_polynomial);
+  // Voxels of 1/4: one and two steps. The error that single precision leaves in the voxels is below 1e-6.
+  const double coarse = distance(field, settings_for(BendingMethod::splitting4, 4), truth),
+               fine = distance(field, settings_for(BendingMethod::splitting4, 2), truth);
+  EXPECT_GT(fine, 3e-6);
+  EXPECT_GT(std::log2(coarse / fine), 3.6);
+  EXPECT_LT(distance(field, settings_for(BendingMethod::splitting4, 0.25), truth), 1e-6);
+}
+
+/// Halving the voxels divides the error by 2⁴ where the field is smooth: a cubic spline is of order 4.
+TEST(CubicRays, VoxelsAreOfOrderFour) {
+  const std::vector<Ray> truth = true_rays(formula);
+  const auto error = [&](int voxels, const Interpolant& interpolant) {
+    return distance(field_of(formula, voxels, interpolant), settings_for(BendingMethod::splitting4, 0.25), truth);
+  };
+  const double coarse = error(9, cubic), middle = error(17, cubic), fine = error(33, cubic);
+  EXPECT_GT(std::log2(coarse / middle), 3);
+  EXPECT_GT(std::log2(middle / fine), 3);
+  EXPECT_LT(fine, 0.05 * error(33, linear));
+  EXPECT_LT(fine, 0.5 * error(129, linear)) << "64 times fewer voxels";
+}
+
+/// A fourth-order step of four voxels (six samples) is more exact than eight steps of half a voxel of `splitting`.
+TEST(CubicRays, FewLongStepsAreMoreExactThanManyShortOnes) {
+  const TensorField field = field_of(formula, 33, cubic);
+  const std::vector<Ray> truth = true_rays(formula);
+  const double interpolation = distance(field, settings_for(BendingMethod::splitting4, 0.25), truth);
+  const double few = distance(field, settings_for(BendingMethod::splitting4, 4), truth),
+               many = distance(field, settings_for(BendingMethod::splitting, 0.5), truth);
+  EXPECT_LT(few - interpolation, many);
+}
+
+/// Automatic steps follow the tolerance.
+TEST(CubicRays, TheErrorFollowsTheTolerance) {
+  const TensorField field = field_of(formula, 33, cubic);
+  const double voxel = voxel_size(field);
+  std::vector<Ray> truth;
+  for (const Start& start : starts())
+    truth.push_back(trace_one(field, Geometry(surfaces_of(field)), settings_for(BendingMethod::splitting4, 0.1),
+                              start.position, start.direction, flexibility));
+  double last = 1;
+  for (const double tolerance : {1e-1, 1e-2, 1e-3, 1e-4, 1e-5}) {
+    BendingSettings settings = settings_for(BendingMethod::automatic, 0);
+    settings.tolerance = tolerance;
+    const double error = distance(field, settings, truth) / voxel;
+    EXPECT_LT(error, 10 * tolerance) << "some ten steps, whose errors add up";
+    EXPECT_LE(error, last);
+    last = error;
+  }
+}
+
+/// For constant T, directions are exact at any step length and strength, up to rounding in the voxels; and the rays of
+/// any multiple of I are straight.
+TEST(CubicRays, ConstantTensors) {
+  const Vector3d direction = Vector3d(0.3, -0.2, 1).normalized();
+  constexpr double length = 0.4;
+  for (const double strength : {0.5, 5.0, 50.0})
+    for (const double step : {0.25, 1.0, 1.6}) {
+      const Matrix3d T = strength * general_tensor();
+      const TensorField field = field_of([&](const Vector3d&) { return T; }, 9, cubic);
+      BendingSettings settings = settings_for(BendingMethod::splitting4, step);
+      settings.max_length = length;
+      const Ray ray = trace_one(field, Geometry(surfaces_of(field)), settings, {0, 0, -0.2}, direction, 0.2);
+      const Vector3d expected = (0.2 * length * T).exp() * direction;
+      EXPECT_LT((ray.direction - expected.normalized()).norm(), 1e-6 * (1 + strength)) << strength << ", step " << step;
+    }
+  const TensorField isotropic = field_of([](const Vector3d&) { return Matrix3d(7 * Matrix3d::Identity()); }, 9, cubic);
+  const Ray ray = trace_one(isotropic, Geometry(surfaces_of(isotropic)), settings_for(BendingMethod::automatic, 0),
+                            {0, 0, -0.2}, direction, 0.2);
+  EXPECT_LT((ray.direction - direction).norm(), 1e-12);
+}
+
+/// The path retraced from its end with −V and −s returns, to the order of the method.
+TEST(CubicRays, Reversal) {
+  const TensorField field = field_of(formula, 33, cubic);
+  const Geometry geometry(surfaces_of(field));
+  for (const Start& start : starts()) {
+    const BendingSettings settings = settings_for(BendingMethod::automatic, 0);
+    const Ray there = trace_one(field, geometry, settings, start.position, start.direction, flexibility);
+    const Ray back = trace_one(field, geometry, settings, there.position, -there.direction, -flexibility);
+    EXPECT_LT((back.position - start.position).norm(), 1e-3 * voxel_size(field));
+    EXPECT_LT((back.direction + start.direction).norm(), 1e-4);
+  }
+}
+
+/// Derivatives are those of the rays: central differences agree to the square of their distance.
+TEST(CubicRays, DifferentialsAreDerivatives) {
+  const TensorField field = field_of(formula, 17, cubic);
+  const Geometry geometry(surfaces_of(field));
+  const BendingSettings settings = settings_for(BendingMethod::splitting4, 1);
+  for (const Start& start : starts()) {
+    const Vector3d across = upright(start.direction, Vector3d::UnitX());
+    RayBatch batch;
+    batch.add(start.position, start.direction, flexibility);
+    RayDifferential differential;
+    differential.position.col(0) = across;
+    differential.direction.col(1) = across;
+    batch.differentials = {differential};
+    RayBatch packets = batch;
+    trace_reference(field, geometry, settings, batch);
+    trace(field, geometry, settings, packets);
+    const double d = 1e-4;
+    const auto moved = [&](double shift, double turn) {
+      return trace_one(field, geometry, settings, start.position + shift * across, start.direction + turn * across,
+                       flexibility);
+    };
+    const Ray right = moved(d, 0), left = moved(-d, 0), up = moved(0, d), down = moved(0, -d);
+    const auto expect = [&](const Ray& a, const Ray& b, int column) {
+      for (const RayBatch* rays : {&batch, &packets}) {
+        const double tolerance = rays == &batch ? 1e-5 : 1e-4;
+        EXPECT_LT(((a.position - b.position) / (2 * d) - rays->differentials[0].position.col(column)).norm(),
+                  tolerance);
+        EXPECT_LT(((a.direction - b.direction) / (2 * d) - rays->differentials[0].direction.col(column)).norm(),
+                  tolerance);
+      }
+    };
+    expect(right, left, 0);
+    expect(up, down, 1);
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

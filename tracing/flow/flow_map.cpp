@@ -1,0 +1,364 @@
+#include "tracing/flow/flow_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <tbb/parallel_for.h>
+
+#include "base/geometry/box.h"
+#include "base/process/job.h"
+#include "tracing/flow/flow_triangles.h"
+#include "tracing/flow/flow_vertices.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double margin = 1.0 / 8;  // Extension of the plate on each side, in sizes of the plate.
+
+// The first quads are of the lesser of these two sizes, for the usual tolerance.
+constexpr double first_pixels = 8;       // In pixels of straight light.
+constexpr double first_voxels = 1;       // In voxels, so that no part of the field is missed; ...
+constexpr double most_for_voxels = 64;   // ... but voxels ask for no more quads than this along a side.
+constexpr double usual_tolerance = 0.5;  // Pixels.
+
+constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
+                                // its own way within a part of one.
+constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than this part of the tolerance is allowed.
+constexpr float still_pixels = 1;  // Light that moves by no more, from the first wavelength sample to the last, is in
+                                   // one place.
+constexpr double swept_share = 0.99;  // The part of the vertices whose light moves slowly enough from band to band.
+constexpr int most_levels = 14;
+constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
+
+/// Vertices in the middles of a quad's sides, counter-clockwise from the lower one, and in its own.
+using Middles = std::array<std::uint32_t, 5>;
+
+/// The size of a pixel in the plane where light starts, as straight light projects it.
+double pixel_of_starts(const Plate& plate, const Beam& beam) {
+  const double slope =
+      std::abs(plate.normal().dot(beam.direction)) / std::abs(beam.right.cross(beam.up).dot(beam.direction));
+  return start_ratio(beam, plate.center) * std::sqrt(plate.pixel_area() * std::clamp(slope, 1e-6, 1e6));
+}
+
+/// The size of the first quads, world units. The error of landings between vertices is of second order, so that a finer
+/// tolerance has smaller quads. If few vertices are allowed, quads are large: a quarter of the vertices is for the
+/// first quads and their first division.
+double first_size(const TensorField& field, const Beam& beam, double pixel, const FlowSettings& settings) {
+  const Eigen::Vector2d extent = box_of(beam.aperture).sizes();
+  const double voxel =
+      start_ratio(beam, field.world_box().center()) * field.to_world().linear().colwise().norm().minCoeff();
+  const double for_voxels = std::max(first_voxels * voxel, extent.maxCoeff() / most_for_voxels);
+  const double usual = std::min(first_pixels * pixel, for_voxels);
+  const double least = std::sqrt(16 * extent.prod() / static_cast<double>(settings.most_starts));
+  return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
+}
+
+Geometry extended(const Geometry& geometry) {
+  Surfaces surfaces = geometry.surfaces();
+  surfaces.plate->size *= 1 + 2 * margin;
+  return Geometry(std::move(surfaces));
+}
+
+class FlowMapBuilder {
+ public:
+  /// @param settings  With a plate.
+  FlowMapBuilder(const TensorField& field, const Geometry& geometry, const Beam& beam, const BendingSettings& bending,
+                 const FlowSettings& settings, const Progress& progress)
+      : plate_(*settings.plate),
+        beam_(beam),
+        settings_(settings),
+        vertices_(field, geometry, beam, bending, settings, progress) {
+    const double pixel = pixel_of_starts(plate_, beam);
+    const double size = first_size(field, beam, pixel, settings);
+    lattice().patches = patches_of(beam.aperture, size);
+    lattice().is_graded = settings.silhouette;
+    first_size_ = static_cast<float>(size / pixel);
+    const double finest = std::min(settings.finest, settings.tolerance) * pixel;
+    while (lattice().levels < most_levels && std::ldexp(size, -lattice().levels) > finest) ++lattice().levels;
+    lattice().still_levels = is_light() && lattice().levels < most_levels ? 1 : 0;
+    lattice().levels += lattice().still_levels;
+  }
+
+  FlowMap build() && {
+    add_first_quads();
+    vertices_.trace_new();
+    while (divide_quads())
+      if (settings_.show) settings_.show([&] { return with_triangles(map()); });
+    vertices_.keep();
+    FlowMap map = with_triangles(vertices_.take());
+    map.is_complete = is_complete_;
+    return map;
+  }
+
+ private:
+  const FlowMap& map() const { return vertices_.map(); }
+  FlowLattice& lattice() { return vertices_.lattice; }
+  const FlowLattice& lattice() const { return vertices_.lattice; }
+
+  void add_first_quads() {
+    const std::uint32_t side = 1u << lattice().levels;
+    for (std::uint32_t p = 0; p < lattice().patches.size(); ++p)
+      for (std::uint32_t row = 0; row < static_cast<std::uint32_t>(lattice().patches[p].rows); ++row)
+        for (std::uint32_t column = 0; column < static_cast<std::uint32_t>(lattice().patches[p].columns); ++column) {
+          if (!is_in_part(row, column)) continue;
+          const std::uint32_t x = column * side, y = row * side;
+          Quad quad{p, x, y};
+          quad.corners = {vertices_.at(p, x, y), vertices_.at(p, x + side, y), vertices_.at(p, x + side, y + side),
+                          vertices_.at(p, x, y + side)};
+          quads_.push_back(quad);
+        }
+  }
+
+  /// Whether a first quad belongs to the part of this shard. Blocks of a shard are far apart, so that shards have
+  /// nearly the same work.
+  bool is_in_part(std::uint32_t row, std::uint32_t column) const {
+    if (!settings_.job || !settings_.is_kept || !settings_.job->is_shard) return true;
+    const WorkPart part = settings_.job->part();
+    const std::size_t step = std::max<std::size_t>(1, part.count * 3 / 8);
+    return (column / block_size + row / block_size * step) % part.count == part.index;
+  }
+
+  FlowMap with_triangles(FlowMap map) const {
+    add_triangles(lattice(), quads_, beam_, map);
+    return map;
+  }
+
+  /// Where the light of some vertices lands at one sample.
+  struct Reach {
+    Eigen::Array2f low = Eigen::Array2f::Constant(std::numeric_limits<float>::infinity()), high = -low;  // Pixels.
+    std::size_t landed = 0;  // Number of the vertices whose light lands.
+  };
+
+  template <std::size_t count>
+  Reach reach_of(const std::array<std::uint32_t, count>& vertices, std::size_t sample) const {
+    Reach reach;
+    for (const std::uint32_t vertex : vertices) {
+      if (!map().landed(vertex, sample)) continue;
+      ++reach.landed;
+      reach.low = reach.low.min(map().landing(vertex, sample).array());
+      reach.high = reach.high.max(map().landing(vertex, sample).array());
+    }
+    return reach;
+  }
+
+  bool is_on_plate(const Reach& reach) const {
+    const Eigen::Array2f size = plate_.resolution.cast<float>().array();
+    return reach.landed > 0 && (settings_.beside || ((reach.low < size).all() && (reach.high > 0).all()));
+  }
+
+  /// Whether the map is to be drawn as light. Otherwise it says what is seen at each place.
+  bool is_light() const { return settings_.silhouette; }
+
+  /// The lesser extent of a quad's light on the plate, pixels; 0 on a fold.
+  float width_of(const Quad& quad, const Reach& reach, std::size_t sample) const {
+    const auto& [a, b, c, d] = quad.corners;
+    const Eigen::Vector2f up = map().landing(c, sample) - map().landing(a, sample),
+                          down = map().landing(d, sample) - map().landing(b, sample);
+    const float area = std::abs(up.x() * down.y() - up.y() * down.x()) / 2;
+    return area > 0 ? area / (reach.high - reach.low).maxCoeff() : 0;
+  }
+
+  /// The error of landings that a quad may have, pixels, where it says what is seen at a place.
+  /// @param extent  The greatest of the quad's landings, pixels.
+  float place_bound(float extent) const {
+    return static_cast<float>(settings_.tolerance) * std::sqrt(std::max(extent, 1.0f));
+  }
+
+  /// The error of landings that a quad may have, pixels, in a map that is drawn as light. The error moves light: of
+  /// that, a larger quad has more, and it is seen less where it is spread over the plate. As the map also says where
+  /// light of each place comes from, `place_bound` must hold, too.
+  /// @param width  The least of the quad's light at any wavelength, pixels.
+  /// @param sweep  The distance of its light from the first wavelength sample to the last, pixels.
+  float light_bound(const Quad& quad, float extent, float width, float sweep) const {
+    const float size = std::ldexp(first_size_, -quad.level), pixel = 1;
+    const float bound = static_cast<float>(settings_.tolerance) * std::max(width / size, gathered_part);
+    return std::min(bound, place_bound(extent)) * std::cbrt(std::max(sweep / std::max(width, pixel), 1.0f));
+  }
+
+  bool needs_division(const Quad& quad) const {
+    if (quad.level >= lattice().levels) return false;
+    const bool is_for_still_light = quad.level >= lattice().levels - lattice().still_levels;
+    const bool is_at_edge = settings_.silhouette && lattice().is_at_edge(quad);
+    if (quad.level < (is_at_edge ? edge_levels : 1)) return true;  // There is no estimate of its error yet.
+    bool is_seen = false;
+    float width = std::numeric_limits<float>::infinity(), extent = 0;
+    Eigen::Vector2f first(0, 0), last(0, 0);
+    for (const std::size_t sample : vertices_.check_samples()) {
+      const Reach reach = reach_of(quad.corners, sample);
+      if (!is_on_plate(reach)) continue;
+      if (reach.landed < 4) return !is_for_still_light;
+      width = std::min(width, width_of(quad, reach, sample));
+      extent = std::max(extent, (reach.high - reach.low).maxCoeff());
+      last = map().landing(quad.corners[0], sample);
+      if (!is_seen) first = last;
+      is_seen = true;
+    }
+    const float sweep = settings_.range ? (last - first).norm() : 0;
+    if (!is_seen || (is_for_still_light && sweep > still_pixels)) return false;
+    return quad.error > (is_light() ? light_bound(quad, extent, width, sweep) : place_bound(extent));
+  }
+
+  /// The quads that need division, or those with the greatest errors if they are too many.
+  std::vector<std::size_t> choose_quads() {
+    std::vector<std::uint8_t> needs(quads_.size());
+    tbb::parallel_for(std::size_t{0}, quads_.size(), [&](std::size_t i) { needs[i] = needs_division(quads_[i]); });
+    std::vector<std::size_t> chosen;
+    for (std::size_t i = 0; i < quads_.size(); ++i)
+      if (needs[i]) chosen.push_back(i);
+    // A division adds up to five vertices, and about three as neighbours share them.
+    const std::size_t room = (settings_.most_starts - std::min(settings_.most_starts, map().starts.size())) / 3;
+    if (chosen.size() > room) {
+      is_complete_ = false;
+      std::stable_sort(chosen.begin(), chosen.end(),
+                       [&](std::size_t a, std::size_t b) { return quads_[a].error > quads_[b].error; });
+      chosen.resize(room);
+      std::sort(chosen.begin(), chosen.end());
+    }
+    return chosen;
+  }
+
+  /// @return whether there were any.
+  bool divide_quads() {
+    const std::vector<std::size_t> chosen = choose_quads();
+    std::vector<Middles> added;
+    for (const std::size_t i : chosen) added.push_back(middles_of(quads_[i]));
+    vertices_.trace_new();
+    std::vector<float> deviations(chosen.size());
+    tbb::parallel_for(std::size_t{0}, chosen.size(),
+                      [&](std::size_t i) { deviations[i] = deviation_of(quads_[chosen[i]], added[i]); });
+    std::vector<Quad> next;
+    next.reserve(quads_.size() + 3 * chosen.size());
+    auto from = quads_.begin();
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      const auto quad = quads_.begin() + static_cast<std::ptrdiff_t>(chosen[i]);
+      next.insert(next.end(), from, quad);
+      for (std::uint32_t quarter = 0; quarter < 4; ++quarter)
+        next.push_back(quarter_of(*quad, quarter, added[i], deviations[i]));
+      from = quad + 1;
+    }
+    next.insert(next.end(), from, quads_.end());
+    quads_ = std::move(next);
+    return !chosen.empty();
+  }
+
+  Middles middles_of(const Quad& quad) {
+    const std::uint32_t side = lattice().side_of(quad), half = side / 2, x = quad.x, y = quad.y, p = quad.patch;
+    const auto& [a, b, c, d] = quad.corners;
+    // At the silhouette, landings are singular: neighbours say little about each other.
+    const bool has_parents = !settings_.silhouette || !lattice().is_on_border(quad);
+    const auto middle = [&](std::uint32_t at_x, std::uint32_t at_y, const Parents& parents) {
+      return vertices_.at(p, at_x, at_y, has_parents ? parents : Parents());
+    };
+    return {middle(x + half, y, {{a, b}, 2}), middle(x + side, y + half, {{b, c}, 2}),
+            middle(x + half, y + side, {{c, d}, 2}), middle(x, y + half, {{d, a}, 2}),
+            middle(x + half, y + half, {{a, b, c, d}, 4})};
+  }
+
+  /// The error is what the part's own deviation will be if deviations go on to fall by the same ratio: to a quarter
+  /// from level to level where landings are smooth, by less at singular places.
+  Quad quarter_of(const Quad& quad, std::uint32_t quarter, const Middles& middles, float deviation) const {
+    const std::uint32_t half = lattice().side_of(quad) / 2;
+    const auto& [a, b, c, d] = quad.corners;
+    const auto& [ab, bc, cd, da, center] = middles;
+    Quad part{quad.patch, quad.x + quarter % 2 * half, quad.y + quarter / 2 * half, quad.level + 1};
+    const bool known = std::isfinite(deviation) && std::isfinite(quad.deviation) && quad.deviation > 0;
+    part.deviation = deviation;
+    part.error = deviation * (known ? std::clamp(deviation / quad.deviation, 0.25f, 1.0f) : 1.0f);
+    part.corners = std::array<std::array<std::uint32_t, 4>, 4>{
+        {{a, ab, center, da}, {ab, b, bc, center}, {da, center, cd, d}, {center, bc, c, cd}}}[quarter];
+    return part;
+  }
+
+  /// How far the landings of the middles are, at most, from what the corners beside them predict, at one wavelength
+  /// sample; infinite if some of the light does not land.
+  float deviation_at(const Quad& quad, const Middles& middles, std::size_t sample) const {
+    std::array<Eigen::Vector2f, 4> at;
+    for (int i = 0; i < 4; ++i) {
+      if (!map().landed(quad.corners[i], sample)) return std::numeric_limits<float>::infinity();
+      at[i] = map().landing(quad.corners[i], sample);
+    }
+    const auto [u, v] = middle_of(quad);
+    const auto between = [](const Eigen::Vector2f& from, const Eigen::Vector2f& to, float part) {
+      return Eigen::Vector2f((1 - part) * from + part * to);
+    };
+    const Eigen::Vector2f bottom = between(at[0], at[1], u), top = between(at[3], at[2], u);
+    const std::array<Eigen::Vector2f, 5> expected{bottom, between(at[1], at[2], v), top, between(at[0], at[3], v),
+                                                  between(bottom, top, v)};
+    float greatest = 0;
+    for (int i = 0; i < 5; ++i) {
+      if (!map().landed(middles[i], sample)) return std::numeric_limits<float>::infinity();
+      greatest = std::max(greatest, (map().landing(middles[i], sample) - expected[i]).norm());
+    }
+    return greatest;
+  }
+
+  /// Where the middle of a quad lies in it; (½, ½) but at the aperture's edge.
+  std::pair<float, float> middle_of(const Quad& quad) const {
+    const std::uint32_t side = lattice().side_of(quad), half = side / 2;
+    const auto part = [](double first, double middle, double last) {
+      return static_cast<float>((middle - first) / (last - first));
+    };
+    const auto u = [&](std::uint32_t x) { return lattice().u_of(quad.patch, quad.x + x); };
+    const auto v = [&](std::uint32_t y) { return lattice().v_of(quad.patch, quad.y + y); };
+    return {part(u(0), u(half), u(side)), part(v(0), v(half), v(side))};
+  }
+
+  /// The greatest deviation among the samples whose light falls on the plate.
+  float deviation_of(const Quad& quad, const Middles& middles) const {
+    const auto& [a, b, c, d] = quad.corners;
+    const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
+    float greatest = 0;
+    for (const std::size_t sample : vertices_.check_samples())
+      if (is_on_plate(reach_of(all, sample))) greatest = std::max(greatest, deviation_at(quad, middles, sample));
+    return greatest;
+  }
+
+  const Plate plate_;
+  const Beam& beam_;
+  const FlowSettings& settings_;
+  FlowVertices vertices_;
+  std::vector<Quad> quads_;
+  float first_size_ = 1;  // Of the first quads, pixels of straight light.
+  bool is_complete_ = true;
+};
+
+}  // namespace
+
+int band_count(const FlowMap& map, int channels, const BandStep& step) {
+  if (map.wavelengths == 1) return channels;
+  std::vector<float> sweeps;
+  for (std::size_t i = 0; i < map.starts.size(); ++i) {
+    float sweep = 0;
+    for (std::size_t sample = 1; sample < map.wavelengths; ++sample) {
+      const std::size_t at = i * map.wavelengths + sample;
+      if (map.ends[at] == RayEnd::plate && map.ends[at - 1] == RayEnd::plate)
+        sweep += (map.landings[at] - map.landings[at - 1]).norm();
+    }
+    sweeps.push_back(sweep);
+  }
+  const auto place = static_cast<std::ptrdiff_t>(swept_share * static_cast<double>(sweeps.size() - 1));
+  std::nth_element(sweeps.begin(), sweeps.begin() + place, sweeps.end());
+  const double wanted = std::max<double>(step.least, sweeps[static_cast<std::size_t>(place)] / step.pixels);
+  const double most = std::max(1.0, std::floor(static_cast<double>(step.most) / channels));
+  return channels * static_cast<int>(std::clamp(std::ceil(wanted / channels), 1.0, most));
+}
+
+FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Beam& beam,
+                       const BendingSettings& bending, const FlowSettings& settings, const Progress& progress) {
+  if (!settings.plate) {
+    if (!geometry.surfaces().plate) throw std::invalid_argument("a flow map needs a receiver");
+    FlowSettings with_plate = settings;
+    with_plate.plate = geometry.surfaces().plate;
+    return trace_flow_map(field, extended(geometry), beam, bending, with_plate, progress);
+  }
+  if (settings.flexibilities.empty() || (settings.range && settings.flexibilities.size() != 2))
+    throw std::invalid_argument("a flow map needs flexibilities, and a range has two");
+  if (!(settings.tolerance > 0) || !(settings.finest > 0) || settings.most_starts < 1)
+    throw std::invalid_argument("a flow map needs a tolerance and a number of positions greater than 0");
+  return FlowMapBuilder(field, geometry, beam, bending, settings, progress).build();
+}
+
+}  // namespace tensorray

@@ -1,0 +1,388 @@
+#include "tracing/flow_drawing/caustic.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <thread>
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "renderer/coverage/area_deposit.h"
+#include "tracing/flow_drawing/flow_pieces.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double even_part = 0.1;     // If the densities of a quad's halves differ by less than this part of their sum,
+                                      // they become one; ...
+constexpr double uneven_part = 0.15;  // ... from this part on they stay as they are.
+constexpr std::size_t most_memory = 1u << 28;  // Bytes of the deposits of all threads; but each has a row, at least.
+constexpr std::size_t planes = DepositPlanes::count;
+
+/// What is drawn together on the planes of a deposit: the colours, or the irradiance of some channels.
+struct Pass {
+  std::vector<AreaDeposit::PlaneWeights> plane_weights;  // Of each band.
+  std::array<double*, planes> targets{};                 // The films' planes; null: none.
+  double gain = 1;                                       // Of what was deposited.
+  std::size_t first_channel = 0, end_channel = 0;        // The channels whose power is counted.
+
+  bool counts(const CausticBand& band) const { return band.channel >= first_channel && band.channel < end_channel; }
+};
+
+/// Bands in a row that are drawn as light of one place among the wavelength samples, or in parts of a band.
+struct BandRun {
+  std::size_t first = 0, count = 1;
+  double sample = 0, width = 0;
+};
+
+/// Power by channel and end, in units of 2^-54 of a channel's power: sums of integers have no order.
+using PowerSums = std::vector<std::array<std::uint64_t, ray_end_count>>;
+constexpr double power_unit = 18014398509481984.0;
+
+/// A thread's part of a pass.
+struct Worker {
+  AreaDeposit deposit;
+  PowerSums power;
+  std::vector<Eigen::Vector2d> at{};  // Landings of a piece's vertices, pixels.
+  std::vector<RayEnd> ends{};
+  Eigen::AlignedBox2d box{};     // Of the landings, if all of them are on the plate's plane.
+  bool is_all_on_plate = false;  // Whether all light of the piece lands on the plate.
+  std::vector<double> densities{};
+};
+
+struct Drawing {
+  const FlowMap& map;
+  const FlowPieces& pieces;
+  const Eigen::Vector2i plate;
+  const std::vector<CausticBand>& bands;
+  double beam_area = 0;
+  Ranks* ranks = nullptr;
+  const Progress& progress;
+  std::size_t groups = 0;           // That are drawn, by all ranks, in all strips and passes.
+  std::atomic<std::size_t>& drawn;  // Of these.
+};
+
+/// The number of bands that may be drawn as one: all if there are no gaps between them.
+std::size_t joined_bands(const std::vector<CausticBand>& bands) {
+  const bool are_together = std::all_of(bands.begin(), bands.end(), [&](const CausticBand& band) {
+    return band.width > 0 || band.sample == bands[0].sample;
+  });
+  return are_together ? bands.size() : 1;
+}
+
+std::vector<BandRun> runs_at(Detail detail, const std::vector<CausticBand>& bands) {
+  const std::size_t longest = std::size_t{1} << std::max(-detail, 0);
+  std::vector<BandRun> runs;
+  for (std::size_t first = 0; first < bands.size(); first += longest) {
+    const std::size_t count = std::min(longest, bands.size() - first);
+    runs.push_back({first, count, (bands[first].sample + bands[first + count - 1].sample) / 2, bands[first].width});
+  }
+  return runs;
+}
+
+void set_landings(const Drawing& drawing, const FlowPiece& piece, double sample, Worker& worker) {
+  const std::size_t count = piece.vertices.size();
+  worker.at.resize(count);
+  worker.box.setEmpty();
+  if (!piece.always_lands) {
+    worker.ends.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const FlowLanding landing = landing_at(drawing.map, piece.vertices[i], sample);
+      worker.at[i] = landing.at;
+      worker.ends[i] = landing.end;
+    }
+    return;
+  }
+  const auto before = std::min(static_cast<std::size_t>(sample), drawing.map.wavelengths - 1);
+  const Eigen::Vector2f *const a = &piece.landings[before * count],
+                               *const b = &piece.landings[std::min(before + 1, drawing.map.wavelengths - 1) * count];
+  const double part = sample - static_cast<double>(before);
+  for (std::size_t i = 0; i < count; ++i) {
+    worker.at[i] = (1 - part) * a[i].cast<double>() + part * b[i].cast<double>();
+    worker.box.extend(worker.at[i]);
+  }
+}
+
+/// Power by the end of its light.
+using Power = std::array<double, ray_end_count>;
+
+/// The density of a triangle for its edges. Light that is not spread over an area is added here.
+/// @param carried  Its power.
+double start_triangle(const Drawing& drawing, const FlowPiece& piece, const FlowPiece::Triangle& triangle,
+                      double carried, Worker& worker, Power& power) {
+  const auto [a, b, c] = triangle.corners;
+  const std::vector<Eigen::Vector2d>& at = worker.at;
+  const auto landed = [&](std::uint16_t corner) { return piece.always_lands || worker.ends[corner] == RayEnd::plate; };
+  const auto count = [&](RayEnd end, double part) { power[static_cast<int>(end)] += part * carried; };
+  if (landed(a) && landed(b) && landed(c) && !jumps(triangle.is_torn, at[a], at[b], at[c])) {
+    const double on_plate = worker.is_all_on_plate ? 1 : part_on_plate(at[a], at[b], at[c], drawing.plate);
+    count(RayEnd::plate, on_plate);
+    count(RayEnd::missed, 1 - on_plate);
+    return worker.deposit.triangle(at[a], at[b], at[c], carried);
+  }
+  for (const std::uint16_t corner : triangle.corners) {
+    if (!landed(corner)) {
+      count(worker.ends[corner], 1.0 / 3);
+      continue;
+    }
+    count(is_on_plate(at[corner], drawing.plate) ? RayEnd::plate : RayEnd::missed, 1.0 / 3);
+    worker.deposit.add_point(at[corner], carried / 3);
+  }
+  return 0;
+}
+
+/// Gives the two triangles of a quad one density if theirs are nearly the same, so that the edge between them need not
+/// be drawn. From `even_part` on, their difference grows to its full value without a jump. Their power stays the same.
+void even_out(double& a, double& b, double area_a, double area_b) {
+  if (!(a * b > 0)) return;
+  const double part = std::abs(a - b) / std::abs(a + b);
+  if (part >= uneven_part) return;
+  const double even = (area_a + area_b) / (area_a / a + area_b / b);
+  const double left = std::max(part - even_part, 0.0) / (uneven_part - even_part);
+  a = even + left * (a - even);
+  b = even + left * (b - even);
+}
+
+/// Draws a piece at one place among the wavelength samples.
+/// @param unit  The power of a triangle of unit area.
+void draw_piece(const Drawing& drawing, const FlowPiece& piece, double sample, double unit, Worker& worker,
+                Power& power) {
+  set_landings(drawing, piece, sample, worker);
+  const Eigen::AlignedBox2d plate(Eigen::Vector2d::Zero(), drawing.plate.cast<double>());
+  if (piece.always_lands && !plate.intersects(worker.box)) {
+    power[static_cast<int>(RayEnd::missed)] += unit * piece.area;
+    return;
+  }
+  worker.is_all_on_plate = piece.always_lands && plate.contains(worker.box);
+  std::vector<double>& densities = worker.densities;
+  densities.clear();
+  for (const FlowPiece::Triangle& triangle : piece.triangles)
+    densities.push_back(start_triangle(drawing, piece, triangle, unit * triangle.area, worker, power));
+  for (const FlowPiece::Edge& edge : piece.edges)
+    if (edge.is_diagonal)
+      even_out(densities[edge.along], densities[edge.against], piece.triangles[edge.along].area,
+               piece.triangles[edge.against].area);
+  const auto density = [&](std::uint16_t triangle) {
+    return triangle == FlowPiece::Edge::none ? 0 : densities[triangle];
+  };
+  for (const FlowPiece::Edge& edge : piece.edges) {
+    const double difference = density(edge.along) - density(edge.against);
+    if (difference != 0) worker.deposit.add_edge(worker.at[edge.from], worker.at[edge.to], difference);
+  }
+}
+
+AreaDeposit::PlaneWeights plane_weights_of(const Pass& pass, const BandRun& run) {
+  AreaDeposit::PlaneWeights plane_weights{};
+  for (std::size_t i = run.first; i < run.first + run.count; ++i)
+    for (std::size_t k = 0; k < planes; ++k) plane_weights[k] += pass.plane_weights[i][k];
+  return plane_weights;
+}
+
+/// Light without colour has power, too.
+bool counts_power(const Drawing& drawing, const Pass& pass, const BandRun& run) {
+  const auto first = drawing.bands.begin() + static_cast<std::ptrdiff_t>(run.first);
+  return std::any_of(first, first + static_cast<std::ptrdiff_t>(run.count),
+                     [&](const CausticBand& band) { return pass.counts(band); });
+}
+
+void add_power(const Drawing& drawing, const Pass& pass, const BandRun& run, const Power& power, PowerSums& sums) {
+  for (std::size_t i = run.first; i < run.first + run.count; ++i) {
+    const CausticBand& band = drawing.bands[i];
+    if (!pass.counts(band)) continue;
+    for (int end = 0; end < ray_end_count; ++end)
+      sums[band.channel][end] += static_cast<std::uint64_t>(power_unit * band.weight * power[end]);
+  }
+}
+
+/// Draws the triangles of a group at all their places.
+/// @param counts  Whether their power is counted.
+void draw_group(const Drawing& drawing, const Pass& pass, std::size_t group, bool counts, Worker& worker) {
+  for (const FlowPiece& piece : pieces_of(drawing.pieces, group))
+    for (const BandRun& run : runs_at(piece.detail, drawing.bands)) {
+      const AreaDeposit::PlaneWeights plane_weights = plane_weights_of(pass, run);
+      if (plane_weights == AreaDeposit::PlaneWeights{} && !(counts && counts_power(drawing, pass, run))) continue;
+      worker.deposit.set_plane_weights(plane_weights);
+      Power power{};
+      const int parts = std::max(piece.detail, 0) + 1;
+      for (int part = 0; part < parts; ++part)
+        draw_piece(drawing, piece, run.sample + ((part + 0.5) / parts - 0.5) * run.width, 1 / drawing.beam_area / parts,
+                   worker, power);
+      if (counts) add_power(drawing, pass, run, power, worker.power);
+    }
+}
+
+/// Rows of the plate that are drawn together.
+struct Strip {
+  int first = 0, end = 0;
+
+  /// Whether the power of a group is counted with this strip: it is the first one that has its light.
+  bool counts(std::pair<float, float> rows, int height) const {
+    const float row = std::clamp(rows.first, 0.0f, static_cast<float>(height - 1));
+    return row >= static_cast<float>(first) && row < static_cast<float>(end);
+  }
+  bool has_light(std::pair<float, float> rows) const {
+    return rows.first <= static_cast<float>(end) && rows.second >= static_cast<float>(first);
+  }
+};
+
+/// As many rows as the memory of all threads of the root allows. The result does not depend on it.
+std::vector<Strip> strips_of(const Eigen::Vector2i& plate, Ranks* ranks) {
+  const auto threads = static_cast<std::size_t>(broadcast(ranks, tbb::this_task_arena::max_concurrency()));
+  const std::size_t row = 8 * planes * (static_cast<std::size_t>(plate.x()) + 3);
+  const int rows = static_cast<int>(std::clamp<std::size_t>(most_memory / (threads * row), 1, plate.y()));
+  std::vector<Strip> strips;
+  for (int first = 0; first < plate.y(); first += rows) strips.push_back({first, std::min(first + rows, plate.y())});
+  return strips;
+}
+
+/// Adds what the threads have deposited to the films.
+void add_to_films(const Pass& pass, const std::vector<AreaDeposit>& joined, const Strip& strip, int width) {
+  std::vector<const AreaDeposit*> deposits;
+  for (const AreaDeposit& each : joined) deposits.push_back(&each);
+  tbb::parallel_for(strip.first, strip.end, [&](int y) {
+    std::vector<double> row(static_cast<std::size_t>(width));
+    for (std::size_t k = 0; k < planes; ++k) {
+      if (!pass.targets[k]) continue;
+      AreaDeposit::read_row(deposits, y, static_cast<int>(k), row.data());
+      double* const target = pass.targets[k] + static_cast<std::size_t>(y) * row.size();
+      for (std::size_t x = 0; x < row.size(); ++x) target[x] += pass.gain * row[x];
+    }
+  });
+}
+
+/// The greatest sum of parts that a plane gets: plane_weights are divided by it, so that no sum of integers is too
+/// great.
+double greatest_sum(const std::vector<AreaDeposit::PlaneWeights>& plane_weights) {
+  AreaDeposit::PlaneWeights sums{};
+  for (const AreaDeposit::PlaneWeights& each : plane_weights)
+    for (std::size_t k = 0; k < planes; ++k) sums[k] += std::abs(each[k]);
+  return *std::max_element(sums.begin(), sums.end());
+}
+
+/// The passes that fill the films. Without irradiance the power of all channels is counted with the colours.
+std::vector<Pass> passes_of(const std::vector<CausticBand>& bands, double gain, Caustic& caustic) {
+  const auto channels = caustic.power.size();
+  std::vector<Pass> passes;
+  const auto add = [&](Pass pass) {
+    const double greatest = greatest_sum(pass.plane_weights);
+    if (greatest == 0 && pass.first_channel == pass.end_channel) return;
+    for (AreaDeposit::PlaneWeights& plane_weights : pass.plane_weights)
+      for (double& share : plane_weights) share /= greatest > 0 ? greatest : 1;
+    pass.gain = gain * greatest;
+    passes.push_back(std::move(pass));
+  };
+  Pass colors;
+  for (const CausticBand& band : bands)
+    colors.plane_weights.push_back({band.color[0], band.color[1], band.color[2], 0});
+  for (int c = 0; c < 3; ++c) colors.targets[static_cast<std::size_t>(c)] = caustic.color.plane(c);
+  if (caustic.irradiance.channels == 0) colors.end_channel = channels;
+  add(std::move(colors));
+  for (std::size_t first = 0; first < channels && caustic.irradiance.channels > 0; first += planes) {
+    Pass pass;
+    pass.first_channel = first;
+    pass.end_channel = std::min(first + planes, channels);
+    for (std::size_t channel = first; channel < pass.end_channel; ++channel)
+      pass.targets[channel - first] = caustic.irradiance.plane(static_cast<int>(channel));
+    for (const CausticBand& band : bands) {
+      AreaDeposit::PlaneWeights plane_weights{};
+      if (band.channel >= first && band.channel < pass.end_channel) plane_weights[band.channel - first] = band.weight;
+      pass.plane_weights.push_back(plane_weights);
+    }
+    add(std::move(pass));
+  }
+  return passes;
+}
+
+/// The ends of each channel's light, at its last band.
+void count_ends(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands, Caustic& caustic) {
+  std::vector<double> samples(caustic.ends.size(), -1);
+  for (const CausticBand& band : bands) samples[band.channel] = band.sample;
+  tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t channel) {
+    for (std::size_t i = 0; i < map.starts.size() && samples[channel] >= 0; ++i) {
+      const FlowLanding landing = landing_at(map, i, samples[channel]);
+      const bool is_beside = landing.end == RayEnd::plate && !is_on_plate(landing.at, plate.resolution);
+      ++caustic.ends[channel][static_cast<int>(is_beside ? RayEnd::missed : landing.end)];
+    }
+  });
+}
+
+void add_power(const PowerSums& more, PowerSums& power) {
+  for (std::size_t channel = 0; channel < power.size(); ++channel)
+    for (int end = 0; end < ray_end_count; ++end) power[channel][end] += more[channel][end];
+}
+
+/// Gives the root what this rank has drawn of a strip.
+/// @param deposits  Of the threads. They are joined, and the root adds those of the others.
+/// @param power     Of this rank; at the root, of all.
+void gather_strip(const Drawing& drawing, const Strip& strip, std::vector<AreaDeposit>& deposits, PowerSums& power) {
+  if (deposits.empty()) deposits.emplace_back(drawing.plate.x(), drawing.plate.y(), strip.first, strip.end);
+  for (; deposits.size() > 1; deposits.pop_back()) deposits[0].add(deposits.back().sums());
+  gather_in_turn(drawing.ranks, [&](Archive& archive) {
+    for (auto& of_channel : power) archive.copy_sums(of_channel.data(), of_channel.size());
+    std::vector<std::uint64_t> sums = archive.reads() ? std::vector<std::uint64_t>() : deposits[0].sums();
+    archive.copy_list(sums);
+    if (archive.reads()) deposits[0].add(sums);
+  });
+}
+
+void draw_strip(const Drawing& drawing, const Pass& pass, const Strip& strip, PowerSums& power) {
+  const std::thread::id caller = std::this_thread::get_id();
+  const int width = drawing.plate.x(), height = drawing.plate.y();
+  tbb::enumerable_thread_specific<Worker> workers([&] {
+    return Worker{AreaDeposit(width, height, strip.first, strip.end), PowerSums(power.size())};
+  });
+  tbb::parallel_for(std::size_t{0}, drawing.pieces.groups(), [&](std::size_t group) {
+    if (drawing.progress.cancelled) throw Cancelled();
+    const bool counts = strip.counts(drawing.pieces.rows[group], height);
+    if (is_mine(drawing.ranks, group) && (counts || strip.has_light(drawing.pieces.rows[group])))
+      draw_group(drawing, pass, group, counts, workers.local());
+    const std::size_t drawn = ++drawing.drawn;
+    if (std::this_thread::get_id() == caller) drawing.progress.update("drawing light", drawn, drawing.groups);
+  });
+  std::vector<AreaDeposit> deposits;
+  PowerSums drawn(power.size());
+  for (Worker& worker : workers) {
+    worker.deposit.flush();
+    deposits.push_back(std::move(worker.deposit));
+    add_power(worker.power, drawn);
+  }
+  if (drawing.ranks) gather_strip(drawing, strip, deposits, drawn);
+  add_power(drawn, power);
+  if (!deposits.empty() && is_root(drawing.ranks)) add_to_films(pass, deposits, strip, width);
+}
+
+}  // namespace
+
+Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
+                     const CausticSettings& settings, const Progress& progress) {
+  const std::size_t channels = settings.channels;
+  const int width = plate.resolution.x(), height = plate.resolution.y();
+  Caustic caustic;
+  caustic.color = Film(width, height, 3);
+  if (settings.by_channel) caustic.irradiance = Film(width, height, static_cast<int>(channels));
+  caustic.power.assign(channels, {});
+  caustic.ends.assign(channels, {});
+  count_ends(map, plate, bands, caustic);
+  double area = 0, widest = 0;
+  for (const FlowTriangle& triangle : map.triangles) area += triangle.area;
+  for (const CausticBand& band : bands) widest = std::max(widest, band.width);
+  const FlowPieces pieces = divide_map(map, widest / settings.step, joined_bands(bands));
+  const std::vector<Pass> passes = passes_of(bands, area / plate.pixel_area(), caustic);
+  const std::vector<Strip> strips = strips_of(plate.resolution, settings.ranks);
+  const std::size_t all = passes.size() * strips.size() * pieces.groups();
+  std::atomic<std::size_t> drawn{0};
+  const Drawing drawing{map, pieces, plate.resolution, bands, area, settings.ranks, progress, all, drawn};
+  PowerSums power(channels);
+  for (const Pass& pass : passes)
+    for (const Strip& strip : strips) draw_strip(drawing, pass, strip, power);
+  for (std::size_t channel = 0; channel < channels; ++channel)
+    for (int end = 0; end < ray_end_count; ++end)
+      caustic.power[channel][end] = static_cast<double>(power[channel][end]) / power_unit;
+  progress.update("drawing light", all, all);
+  return caustic;
+}
+
+}  // namespace tensorray

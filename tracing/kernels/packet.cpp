@@ -1,0 +1,126 @@
+#include "tracing/kernels/packet.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "tracing/steps/exponential.h"
+
+namespace tensorray::packets {
+
+PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& settings_)
+    : field(field_), settings(settings_) {
+  const Eigen::Matrix3d M = field.to_index().linear();
+  const Eigen::Matrix3d to_world = field.to_world().linear();
+  adaptive = settings.step == 0;
+  bounded = std::isfinite(settings.max_length);
+  unit = static_cast<float>(std::exp2(std::round(std::log2(to_world.col(0).norm()))));
+  longest_step = adaptive ? static_cast<float>(step_lengths::longest_composed) : settings.step;
+  // No voxel is longer along any direction. (The norm is not less than the greatest singular value.)
+  const float longest_voxel = static_cast<float>(to_world.norm());
+  longest_kick = longest_step * static_cast<float>(splitting4_method.kick[Composition::kicks / 2]) * longest_voxel;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int column = 0; column < 3; ++column) to_index[axis][column] = static_cast<float>(M(axis, column));
+    first[axis] = static_cast<std::int32_t>(field.voxels().min()[axis]);
+    last[axis] = static_cast<std::int32_t>(field.voxels().max()[axis]);
+    slope[axis] = field.voxels().sizes()[axis] > 0 ? 1.0f : 0.0f;
+    margin[axis] = static_cast<float>(field.index_bounds().max()[axis] - field.voxels().max()[axis]);
+  }
+  find_bricks_near_surfaces();
+}
+
+void PacketMedium::find_bricks_near_surfaces() {
+  constexpr double cells = TensorBrick::cells, most = 1e8;
+  const double margin_of_steps = std::min(longest_step + 1.0, 1e9);  // A step may begin a little outside its brick.
+  for (int axis = 0; axis < 3; ++axis) {
+    first_near[axis] = 1;
+    last_near[axis] = 0;
+    if (!settings.meets_surface) continue;
+    const double low = settings.surfaces.min()[axis] - margin_of_steps - cells;
+    const double high = settings.surfaces.max()[axis] + margin_of_steps;
+    first_near[axis] = static_cast<std::int32_t>(std::clamp(std::ceil(low / cells), -most, most));
+    last_near[axis] = static_cast<std::int32_t>(std::clamp(std::floor(high / cells), -most, most));
+  }
+}
+
+StrongKick strong_kick(const float T[9], float factor, const float v[3]) {
+  const Eigen::Matrix3d A = double{factor} * Eigen::Map<const Eigen::Matrix3f>(T).cast<double>();
+  const auto [direction, log_length] = exponential_direction(A, Eigen::Map<const Eigen::Vector3f>(v).cast<double>());
+  StrongKick result;
+  Eigen::Map<Eigen::Vector3f>(result.direction) = direction.cast<float>();
+  result.log_radiance_scale = static_cast<float>(-3 * log_length);
+  return result;
+}
+
+namespace {
+
+/// The step of a lane, in index space: positions from its brick's first voxel, directions per unit of `time`.
+struct LaneStep {
+  Eigen::Vector3d from, from_direction, to, to_direction, origin;
+  double time, turn;
+
+  LaneStep(const Packet& packet, int lane) : time(packet.time[lane]) {
+    Eigen::Vector3d turned;
+    for (int axis = 0; axis < 3; ++axis) {
+      from[axis] = packet.p[axis][lane];
+      to[axis] = packet.p_next[axis][lane];
+      from_direction[axis] = packet.u[axis][lane];
+      to_direction[axis] = packet.u_next[axis][lane];
+      turned[axis] = packet.v_next[axis][lane] - packet.v[axis][lane];
+      origin[axis] = double{TensorBrick::cells} * packet.brick[axis][lane];
+    }
+    turn = turned.norm();
+  }
+
+  double voxels() const { return time * from_direction.norm(); }
+
+  /// A box around the path, of the control points of its Bézier curve, with a margin for rounding.
+  Eigen::AlignedBox3d bounds() const {
+    constexpr double margin = 0.01;  // Voxels.
+    Eigen::AlignedBox3d box(from.cwiseMin(to), from.cwiseMax(to));
+    box.extend(from + time / 3 * from_direction).extend(to - time / 3 * to_direction);
+    return {origin + box.min() - Eigen::Vector3d::Constant(margin),
+            origin + box.max() + Eigen::Vector3d::Constant(margin)};
+  }
+
+  /// The combination of its ends with the weights of path_weights, or of path_slopes.
+  Eigen::Vector3d at(const PathWeights& w) const {
+    return w.from * from + w.to * to + time * (w.from_direction * from_direction + w.to_direction * to_direction);
+  }
+};
+
+}  // namespace
+
+bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane) {
+  const LaneStep step(packet, lane);
+  if (!medium.settings.surfaces.intersects(step.bounds())) return false;
+  const auto to_world = [&](const Eigen::Vector3d& at) { return medium.field.to_world() * (step.origin + at); };
+  const int count = chords_of(step.voxels(), step.turn);
+  Eigen::Vector3d begin = step.from;
+  for (int i = 1; i <= count; ++i) {
+    const Eigen::Vector3d end = i == count ? step.to : step.at(path_weights(double(i) / count));
+    if (medium.settings.meets_surface(to_world(begin), to_world(end))) return true;
+    begin = end;
+  }
+  return false;
+}
+
+void add_inner_points(const PacketMedium& medium, const Packet& packet, int lane, std::vector<StepPoint>& points) {
+  const LaneStep step(packet, lane);
+  const int count = pieces_of(step.voxels());
+  for (int i = 1; i < count; ++i) {
+    const double t = double(i) / count;
+    const Eigen::Vector3d position = step.at(path_weights(t));
+    const Eigen::Vector3d direction = (medium.field.to_world().linear() * step.at(path_slopes(t))).normalized();
+    StepPoint& point = points.emplace_back();
+    for (int axis = 0; axis < 3; ++axis) {
+      point.brick[axis] = packet.brick[axis][lane];
+      point.position[axis] = static_cast<float>(position[axis]);
+      point.direction[axis] = static_cast<float>(direction[axis]);
+    }
+    point.length = static_cast<float>(packet.length[lane] + t * step.time);
+  }
+}
+
+}  // namespace tensorray::packets

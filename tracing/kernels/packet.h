@@ -1,0 +1,118 @@
+#pragma once
+/// @file tracing/kernels/packet.h
+/// What the kernel's code for all instruction sets shares: the field, a packet of rays, and what only few rays need,
+/// which is computed one by one in double precision.
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "tracing/kernels/packet_kernel.h"
+#include "tracing/steps/composition.h"
+#include "tracing/steps/step_lengths.h"
+#include "volumes/bricks/cubic_brick.h"
+
+namespace tensorray::packets {
+
+/// The field and the settings as the kernel uses them. No member function is inlined into code for an instruction set
+/// that the processor may lack.
+struct PacketMedium {
+  PacketMedium(const TensorField& field, const KernelSettings& settings);
+
+  const TensorField& field;
+  const KernelSettings& settings;
+  bool adaptive;       // Whether the error sets the lengths of steps.
+  bool bounded;        // Whether the limit of length may end rays within the field.
+  float unit;          // A power of two near a voxel's edge, world units: squares of lengths in it are not extreme.
+  float longest_step;  // Voxels; steps through straight bricks may be longer.
+  float longest_kick;  // Longest part of a step that a kick takes, world units.
+  float to_index[3][3];
+  std::int32_t first[3], last[3];            // First and last voxels of the extent.
+  std::int32_t first_near[3], last_near[3];  // Bricks from which a step may meet a surface. May be none.
+  float margin[3];  // Distance of the extent's faces from these voxels: ½ on an axis of a single voxel, else 0.
+  float slope[3];   // 0 along axes with a single voxel, 1 along the others.
+
+  TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
+  /// Whether a step from a brick may meet a surface.
+  bool near_surface(const std::int32_t at[3]) const {
+    bool near = true;
+    for (int axis = 0; axis < 3; ++axis) near &= at[axis] >= first_near[axis] && at[axis] <= last_near[axis];
+    return near;
+  }
+
+ private:
+  void find_bricks_near_surfaces();
+};
+
+/// From this ‖σ h T‖ on, the norm of a kick is computed; below, its bound in the brick is used.
+constexpr float strongest_kick = static_cast<float>(step_lengths::strongest_kick);
+/// Voxels. Shorter steps are taken in double precision.
+constexpr float shortest_step = 1.0f / 1024;
+
+/// With n terms the power series of exp(A) V is exact to 3e-9 for ‖A‖ up to entry n − 2: (3e-9 (n + 1)!)^(1/(n + 1)).
+/// This error must be smaller than rounding errors: it is the same in every step, and they are not.
+constexpr float series_reach[] = {0.00262f, 0.0164f, 0.0514f, 0.1137f, 0.205f,
+                                  0.3238f,  0.4688f, 0.6364f, 0.8246f, 1.03f};
+constexpr int most_terms = 11;
+
+constexpr int packet_rays = 32;  // Number of rays in a packet: several vectors.
+using PerRay = float[packet_rays];
+
+/// Rays side by side, one in each lane. All lanes of its vectors hold a ray, so that no step needs a mask: a lane whose
+/// ray has ended repeats another ray.
+struct alignas(64) Packet {
+  PerRay p[3];                // Position, in voxels from the brick's first voxel.
+  PerRay v[3];                // V; unit, world axes.
+  PerRay u[3];                // The direction in index space: the change of p per world unit.
+  PerRay kick;                // σ.
+  PerRay length;              // Length of the path since the ray entered the packet, world units.
+  PerRay wanted;              // The next step, voxels.
+  PerRay reach;               // Upper bound of ‖σ h T‖ in the brick.
+  PerRay strongest;           // TensorBrick::strongest of the brick.
+  PerRay low[3], high[3];     // Box of the voxels, relative to the brick.
+  PerRay last[3];             // Last cell, relative to the brick.
+  PerRay log_radiance_scale;  // Λ since the ray entered the packet; not of rays with differentials.
+
+  // The step that is being taken:
+  PerRay time;         // Its length, world units.
+  PerRay sample[3];    // Positions of the samples.
+  PerRay voxel;        // Number, in the brick, of the first coefficient that the sample needs.
+  PerRay fraction[3];  // Position within the cell.
+  PerRay tensor[8];    // T − T₂₂ I, column by column, component after component.
+  PerRay p_next[3], v_next[3], u_next[3];
+  PerRay change_of_step;  // Λ of this step.
+  PerRay excess;          // Of adaptive steps: the error divided by the tolerance.
+
+  // Only for rays with differentials: derivatives of p and v along two parameters before and after the step, and slopes
+  // of the tensor along x, y and z.
+  PerRay dp[2][3], dv[2][3], dp_next[2][3], dv_next[2][3];
+  PerRay slopes[3][8];
+
+  const float* bending[packet_rays] = {};  // Of the bricks.
+  alignas(64) std::int32_t brick[3][packet_rays];
+  std::int32_t ray[packet_rays];
+  std::uint32_t alive = 0;  // One bit for each lane.
+  std::uint32_t lands = 0;  // The lanes whose step meets a surface, or a face of the extent.
+  int vectors = 0;          // Number of vectors in use.
+  std::uint32_t steps = 0, most_steps = 0;
+  float greatest_reach = 0;
+  bool near_surface = false;
+  bool straight = false;  // Whether a lane's brick bends nothing.
+};
+
+/// A kick that is too strong for a series in single precision: its direction, zero if there is none, and its Λ.
+struct StrongKick {
+  float direction[3], log_radiance_scale;
+};
+
+/// @param T  T up to a multiple of I, column by column. @param factor  σ h.
+StrongKick strong_kick(const float T[9], float factor, const float v[3]);
+
+/// Whether the step of a lane, from p to p_next, meets a surface.
+bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane);
+
+/// Records points between the ends of a lane's step, which may be long.
+void add_inner_points(const PacketMedium& medium, const Packet& packet, int lane, std::vector<StepPoint>& points);
+
+}  // namespace tensorray::packets

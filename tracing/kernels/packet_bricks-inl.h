@@ -1,0 +1,162 @@
+/// @file tracing/kernels/packet_bricks-inl.h
+/// The bricks of a packet's lanes, and their sample points in these bricks.
+
+// Included once for each instruction set: see Highway's foreach_target.h.
+#if defined(TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
+#ifdef TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
+#undef TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
+#else
+#define TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
+#endif
+
+#include <algorithm>
+
+#include <hwy/highway.h>
+
+#include "tracing/kernels/packet_vectors-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tensorray::packets::HWY_NAMESPACE {
+
+/// The brick of a lane. It is not compared with that of the lane before: where rays part, this costs more than it
+/// saves.
+HWY_INLINE TensorBrick brick_of(const PacketMedium& medium, const Packet& packet, int lane) {
+  const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
+  return medium.brick(at);
+}
+
+/// Finds the bricks of some lanes. `wanted` has one bit for each lane; other lanes of their vectors keep their bricks.
+HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t wanted) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    std::uint32_t rest = bits_of_vector(wanted, i);
+    if (rest == 0) continue;
+    const auto same = [&](int axis) HWY_ATTR {
+      return hn::Eq(hn::Load(ints, packet.brick[axis] + i), hn::Set(ints, packet.brick[axis][i]));
+    };
+    if (hn::AllTrue(ints, hn::And(same(0), hn::And(same(1), same(2))))) {
+      const TensorBrick brick = brick_of(medium, packet, i);
+      std::fill_n(packet.bending + i, lanes, brick.bending);
+      store(set(brick.strongest), packet.strongest, i);
+      continue;
+    }
+    for (; rest != 0; rest &= rest - 1) {
+      const int lane = i + static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
+      const TensorBrick brick = brick_of(medium, packet, lane);
+      packet.bending[lane] = brick.bending;
+      packet.strongest[lane] = brick.strongest;
+    }
+  }
+}
+
+/// Sets the values that depend on the strength of the lanes' bricks.
+HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
+  const F most = set(1e30f), longest = set(medium.longest_kick);
+  F greatest = hn::Zero(floats);
+  packet.straight = false;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F strongest = load(packet.strongest, i);
+    const F reach = hn::Mul(hn::Mul(hn::Abs(load(packet.kick, i)), longest), strongest);
+    store(reach, packet.reach, i);
+    greatest = hn::Max(greatest, hn::IfThenElse(hn::Le(reach, most), reach, most));  // NaN counts as strong.
+    packet.straight |= !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
+  }
+  packet.greatest_reach = hn::GetLane(hn::MaxOfLanes(floats, greatest));
+}
+
+/// Finds the box of the voxels, relative to the lanes' bricks.
+HWY_INLINE void find_extent(const PacketMedium& medium, Packet& packet) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes)
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto base = hn::Mul(hn::Load(ints, packet.brick[axis] + i), hn::Set(ints, TensorBrick::cells));
+      const F low = hn::ConvertTo(floats, hn::Sub(hn::Set(ints, medium.first[axis]), base));
+      const F high = hn::ConvertTo(floats, hn::Sub(hn::Set(ints, medium.last[axis]), base));
+      store(low, packet.low[axis], i);
+      store(high, packet.high[axis], i);
+      store(hn::Max(hn::Sub(high, set(1)), low), packet.last[axis], i);
+    }
+}
+
+/// Sets the values that depend on the lanes' bricks.
+HWY_INLINE void summarize(const PacketMedium& medium, Packet& packet) {
+  find_reach(medium, packet);
+  find_extent(medium, packet);
+  packet.near_surface = false;
+  if (!medium.settings.meets_surface) return;
+  for (int lane = 0; lane < packet.vectors * lanes; ++lane) {
+    const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
+    packet.near_surface |= medium.near_surface(at);
+  }
+}
+
+/// Sets the values that depend on the rays of the lanes. Call it after lanes have been set.
+static HWY_NOINLINE void begin(const PacketMedium& medium, Packet& packet) {
+  find_bricks(medium, packet, ~0u >> (packet_rays - packet.vectors * lanes));
+  summarize(medium, packet);
+}
+
+/// Moves the lanes whose point is outside their brick to the brick of the point. `point(i)` gives the points of the
+/// vector at lane i, relative to the lanes' bricks. `which` has the bits of lanes that may move.
+template <class Point>
+HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t which, const Point& point) {
+  const F zero = hn::Zero(floats), cells = set(TensorBrick::cells);
+  std::uint32_t moved = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    if (bits_of_vector(which, i) == 0) continue;
+    // The cell between the last two voxels is the last one, also for points on its far face.
+    const F3 cell = minimum(floor(point(i)), load(packet.last, i));
+    const auto away = [](F to) HWY_ATTR { return hn::Floor(hn::Mul(to, set(1.0f / TensorBrick::cells))); };
+    const F bricks[3] = {away(cell.x), away(cell.y), away(cell.z)};
+    const Mask moves = hn::Or(hn::Ne(bricks[0], zero), hn::Or(hn::Ne(bricks[1], zero), hn::Ne(bricks[2], zero)));
+    moved |= to_bits(moves, i);
+    for (int axis = 0; axis < 3; ++axis) {
+      store(hn::NegMulAdd(bricks[axis], cells, load(packet.p[axis], i)), packet.p[axis], i);
+      std::int32_t* const brick = packet.brick[axis] + i;
+      hn::Store(hn::Add(hn::Load(ints, brick), hn::ConvertTo(ints, bricks[axis])), ints, brick);
+    }
+  }
+  find_bricks(medium, packet, moved);
+  summarize(medium, packet);
+}
+
+/// Finds the sample points (`point_of(i)` gives those of the vector at lane i) and their cells. Points outside the
+/// extent are moved to it: the tensor there is that of the nearest point.
+/// @param moved  Bits of lanes; only their vectors are found again, and points outside their bricks count as on the
+///               faces of the bricks. 0: all vectors.
+/// @return bits of the lanes whose points are not within their bricks.
+template <class Point>
+HWY_INLINE std::uint32_t find_cells(Packet& packet, std::uint32_t moved, const Point& point_of) {
+  const F last = set(CubicBrick::cells - 1), width = set(CubicBrick::width);
+  std::uint32_t beyond = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    if (moved != 0 && bits_of_vector(moved, i) == 0) continue;
+    F3 point = point_of(i);
+    store(point, packet.sample, i);
+    point = clamp(point, load(packet.low, i), load(packet.high, i));
+    F3 near = clamp(floor(point), load(packet.low, i), load(packet.last, i));
+    // As unsigned integers, negative floats are the greatest.
+    const auto greatest =
+        hn::Max(hn::BitCast(bits, near.x), hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
+    beyond |= to_bits(hn::RebindMask(floats, hn::Gt(greatest, hn::BitCast(bits, last))), i);
+    if (moved != 0) near = clamp(near, zeros(), {last, last, last});
+    store(sub(point, near), packet.fraction, i);
+    store(hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z), packet.voxel, i);
+  }
+  return beyond;
+}
+
+/// Finds the sample points, and moves lanes to the bricks of these points.
+template <class Point>
+HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& point_of) {
+  const std::uint32_t beyond = find_cells(packet, 0, point_of);
+  if (HWY_LIKELY(beyond == 0)) return;
+  move_to_bricks(medium, packet, beyond, [&](int i) HWY_ATTR {
+    return clamp(load(packet.sample, i), load(packet.low, i), load(packet.high, i));
+  });
+  // The remaining points are outside the extent, or rounding put them on a face.
+  find_cells(packet, beyond, point_of);
+}
+
+}  // namespace tensorray::packets::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,450 @@
+#include "tracing/kernels/packet_kernel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <stdexcept>
+
+#include "tracing/kernels/packet.h"
+
+// The code below is compiled once for each instruction set. The best one of the processor is selected at run time.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "tracing/kernels/packet_kernel.cpp"  // NOLINT
+#include <hwy/foreach_target.h>                                 // IWYU pragma: keep
+// Must come after foreach_target.h:
+#include <hwy/highway.h>
+
+#if HWY_TARGET != HWY_SCALAR
+#include "tracing/kernels/packet_landing-inl.h"
+#include "tracing/kernels/packet_step-inl.h"
+#endif
+
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace tensorray::packets::HWY_NAMESPACE {
+
+#if HWY_TARGET == HWY_SCALAR
+// Without vectors there is no kernel: see lane_count.
+constexpr int lanes = 1;
+std::uint64_t trace(const PacketMedium&, KernelRays&) { return 0; }
+#else
+
+/// Takes rays, with or without differentials, through the field in packets: fills a packet, steps it until all of its
+/// rays have ended, and takes those that leave the extent to its faces.
+template <bool differentials>
+class Kernel {
+ public:
+  Kernel(const PacketMedium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
+
+  std::uint64_t run();
+
+ private:
+  // Number of packets that are stepped in turn. With enough vectors, the processor has work while one of them waits.
+  static constexpr int in_flight = lanes > 8 ? 2 : 1;
+
+  void fill(Packet& packet);
+  void enter(Packet& packet, int lane);
+  static void copy_lane(const Packet& from, int of, Packet& to, int lane);
+  static void copy_end(const Packet& from, int of, Packet& to, int lane);
+  void compact(Packet& packet);
+  void step(Packet& packet);
+  std::uint32_t stopped(Packet& packet) const;
+  std::uint32_t spent(const Packet& packet) const;
+  void add_step(Packet& packet);
+  void retire(Packet& packet, std::uint32_t stop, std::uint32_t leave);
+  void keep_points(const Packet& packet, std::uint32_t which);
+  void land(Packet& packet);
+  void arrive(Packet& packet, const FaceLanding& landing);
+
+  const PacketMedium& medium_;
+  std::vector<KernelRay>& rays_;
+  KernelRays& batch_;
+  std::size_t next_ = 0;  // The first ray that no packet has held yet.
+  std::uint64_t samples_ = 0;
+  Packet packets_[in_flight];
+  /// Rays of these packets that leave the extent, as they were before their last step, and the end of that step.
+  Packet leaving_[in_flight];
+};
+
+/// Calls f(lane) for each lane of `which`.
+template <class Function>
+HWY_INLINE void for_lanes(std::uint32_t which, const Function& f) {
+  for (; which != 0; which &= which - 1) f(static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(which)));
+}
+
+/// Copies a ray into a lane.
+template <bool differentials>
+void Kernel<differentials>::enter(Packet& packet, int lane) {
+  const KernelRay& ray = rays_[packet.ray[lane]];
+  for (int axis = 0; axis < 3; ++axis) {
+    packet.p[axis][lane] = ray.place.position[axis];
+    packet.v[axis][lane] = ray.direction[axis];
+    packet.brick[axis][lane] = ray.place.brick[axis];
+    if constexpr (differentials)
+      for (int i = 0; i < 2; ++i) {
+        packet.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis] * medium_.unit;
+        packet.dv[i][axis][lane] = batch_.differentials[packet.ray[lane]].direction[i][axis] * medium_.unit;
+      }
+  }
+  packet.kick[lane] = ray.strength;
+  packet.length[lane] = 0;
+  packet.log_radiance_scale[lane] = 0;
+}
+
+/// Copies a ray, without the values that depend on its brick (see `begin`).
+template <bool differentials>
+void Kernel<differentials>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
+  for (int axis = 0; axis < 3; ++axis) {
+    to.p[axis][lane] = from.p[axis][of];
+    to.v[axis][lane] = from.v[axis][of];
+    to.u[axis][lane] = from.u[axis][of];
+    to.brick[axis][lane] = from.brick[axis][of];
+    if constexpr (differentials)
+      for (int i = 0; i < 2; ++i) {
+        to.dp[i][axis][lane] = from.dp[i][axis][of];
+        to.dv[i][axis][lane] = from.dv[i][axis][of];
+      }
+  }
+  to.kick[lane] = from.kick[of];
+  to.length[lane] = from.length[of];
+  to.log_radiance_scale[lane] = from.log_radiance_scale[of];
+  to.time[lane] = from.time[of];
+  to.wanted[lane] = from.wanted[of];
+  to.ray[lane] = from.ray[of];
+}
+
+/// Copies the end of a lane's step.
+template <bool differentials>
+void Kernel<differentials>::copy_end(const Packet& from, int of, Packet& to, int lane) {
+  for (int axis = 0; axis < 3; ++axis) {
+    to.p_next[axis][lane] = from.p_next[axis][of];
+    to.v_next[axis][lane] = from.v_next[axis][of];
+    to.u_next[axis][lane] = from.u_next[axis][of];
+  }
+}
+
+/// Moves the remaining rays to the front if that frees a vector. The other lanes repeat one of these rays.
+template <bool differentials>
+void Kernel<differentials>::compact(Packet& packet) {
+  const int count = static_cast<int>(hwy::PopCount(packet.alive));
+  if (count <= (packet.vectors - 1) * lanes) {
+    int to = 0;
+    for_lanes(packet.alive, [&](int lane) {
+      if (to != lane) copy_lane(packet, lane, packet, to);
+      ++to;
+    });
+    packet.vectors = (count + lanes - 1) / lanes;
+    packet.alive = ~0u >> (packet_rays - count);
+  }
+  const int of = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(packet.alive));
+  for (int lane = 0; lane < packet.vectors * lanes; ++lane)
+    if (!(packet.alive >> lane & 1)) copy_lane(packet, of, packet, lane);
+  begin(medium_, packet);
+}
+
+template <bool differentials>
+void Kernel<differentials>::fill(Packet& packet) {
+  if (next_ == rays_.size()) return;
+  const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
+  packet.alive = ~0u >> (packet_rays - count);
+  packet.vectors = packet_rays / lanes;
+  packet.steps = 0;
+  packet.most_steps = medium_.settings.max_steps;
+  alignas(64) PerRay norms = {};
+  for (int lane = 0; lane < count; ++lane) {
+    packet.ray[lane] = static_cast<std::int32_t>(next_++);
+    enter(packet, lane);
+    const KernelRay& ray = rays_[packet.ray[lane]];
+    norms[lane] = ray.norm;
+    packet.most_steps = std::min(packet.most_steps, medium_.settings.max_steps - ray.steps);
+  }
+  for (int i = 0; i < packet_rays; i += lanes) store(index_direction(medium_, load(packet.v, i)), packet.u, i);
+  begin_steps(medium_, packet, norms);
+  if (count < packet_rays)
+    compact(packet);
+  else
+    begin(medium_, packet);
+}
+
+/// The lanes that cannot take this step, as bits. Sets those that meet a surface.
+template <bool differentials>
+HWY_NOINLINE std::uint32_t Kernel<differentials>::stopped(Packet& packet) const {
+  std::uint32_t stop = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F3 v = load(packet.v_next, i);
+    stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // The ray has no direction.
+  }
+  if (!packet.near_surface && !medium_.bounded) return stop;
+  for_lanes(packet.alive, [&](int lane) {
+    const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Length of the path up to the field.
+    if (packet.length[lane] + packet.time[lane] + before >= medium_.settings.max_length)
+      stop |= 1u << lane;
+    else if (packet.near_surface && step_meets_surface(medium_, packet, lane))
+      packet.lands |= 1u << lane;
+  });
+  return stop | packet.lands;
+}
+
+/// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
+/// packet counts.
+template <bool differentials>
+HWY_NOINLINE std::uint32_t Kernel<differentials>::spent(const Packet& packet) const {
+  std::uint32_t result = 0;
+  for_lanes(packet.alive, [&](int lane) {
+    if (rays_[packet.ray[lane]].steps + packet.steps >= medium_.settings.max_steps) result |= 1u << lane;
+  });
+  return result;
+}
+
+/// Writes back the rays of some lanes, as they were before the step, and removes them from the packet.
+template <bool differentials>
+HWY_NOINLINE void Kernel<differentials>::retire(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
+  Packet& leaving = leaving_[&packet - packets_];
+  for_lanes(stop | leave, [&](int lane) {
+    KernelRay& ray = rays_[packet.ray[lane]];
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.place.brick[axis] = packet.brick[axis][lane];
+      ray.place.position[axis] = packet.p[axis][lane];
+      ray.direction[axis] = packet.v[axis][lane];
+      ray.end[axis] = packet.p_next[axis][lane];
+      ray.end_direction[axis] = packet.v_next[axis][lane];
+      if constexpr (differentials)
+        for (int i = 0; i < 2; ++i) {
+          batch_.differentials[packet.ray[lane]].position[i][axis] = packet.dp[i][axis][lane] / medium_.unit;
+          batch_.differentials[packet.ray[lane]].direction[i][axis] = packet.dv[i][axis][lane] / medium_.unit;
+        }
+    }
+    ray.length += double{packet.length[lane]};
+    ray.log_radiance_scale += packet.log_radiance_scale[lane];
+    ray.step = packet.time[lane];
+    ray.lands = (packet.lands & stop) >> lane & 1;
+    ray.steps += packet.steps;
+    packet.alive &= ~(1u << lane);
+    if (!(leave >> lane & 1)) return;
+    const int to = static_cast<int>(hwy::PopCount(leaving.alive));
+    copy_lane(packet, lane, leaving, to);
+    copy_end(packet, lane, leaving, to);
+    leaving.alive = leaving.alive << 1 | 1;
+  });
+}
+
+/// Records the points of some lanes.
+template <bool differentials>
+HWY_NOINLINE void Kernel<differentials>::keep_points(const Packet& packet, std::uint32_t which) {
+  alignas(64) float positions[packet_rays][4], directions[packet_rays][4];
+  alignas(64) std::int32_t bricks[packet_rays][4];
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F3 p = load(packet.p, i), v = load(packet.v, i);
+    hn::StoreInterleaved4(p.x, p.y, p.z, load(packet.length, i), floats, positions[i]);
+    hn::StoreInterleaved4(v.x, v.y, v.z, v.z, floats, directions[i]);
+    const auto brick = [&](int axis) HWY_ATTR { return hn::Load(ints, packet.brick[axis] + i); };
+    hn::StoreInterleaved4(brick(0), brick(1), brick(2), brick(2), ints, bricks[i]);
+  }
+  for_lanes(which, [&](int lane) {
+    auto* const point = reinterpret_cast<unsigned char*>(&batch_.points[packet.ray[lane]]->emplace_back());
+    std::memcpy(point + offsetof(StepPoint, position), positions[lane], sizeof positions[lane]);
+    std::memcpy(point + offsetof(StepPoint, direction), directions[lane], sizeof directions[lane]);
+    std::memcpy(point + offsetof(StepPoint, brick), bricks[lane], sizeof bricks[lane]);
+  });
+}
+
+/// Moves the rays to the ends of their steps.
+template <bool differentials>
+HWY_INLINE void Kernel<differentials>::add_step(Packet& packet) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    store(load(packet.p_next, i), packet.p, i);
+    store(load(packet.v_next, i), packet.v, i);
+    store(load(packet.u_next, i), packet.u, i);
+    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
+    if constexpr (differentials)
+      for (int k = 0; k < 2; ++k) {
+        store(load(packet.dp_next[k], i), packet.dp[k], i);
+        store(load(packet.dv_next[k], i), packet.dv[k], i);
+      }
+    else
+      store(hn::Add(load(packet.log_radiance_scale, i), load(packet.change_of_step, i)), packet.log_radiance_scale, i);
+  }
+  ++packet.steps;
+}
+
+/// Takes a step, and takes out the rays that it ends, as they were before it.
+template <bool differentials>
+HWY_NOINLINE void Kernel<differentials>::step(Packet& packet) {
+  find_times(medium_, packet);
+  std::uint32_t stop = too_short(medium_, packet);
+  take_step<differentials>(medium_, packet);
+  samples_ += hwy::PopCount(packet.alive) * std::uint64_t{Composition::kicks};
+  const std::uint32_t staying = medium_.adaptive ? control_steps<differentials>(medium_, packet) : 0;
+  packet.lands = 0;
+  std::uint32_t leave = 0;
+  for (int axis = 0; axis < 3; ++axis) leave |= outside(medium_, packet, packet.p_next[axis], axis);
+  leave &= ~staying;
+  stop |= stopped(packet) & ~staying;
+  if (packet.steps >= packet.most_steps) stop |= spent(packet);
+  if constexpr (differentials) {  // The reference computes the differentials at a crossing.
+    stop |= leave;
+    packet.lands |= leave;
+    leave = 0;
+  }
+  const std::uint32_t between = outside_between(medium_, packet, leave) & ~staying;
+  packet.lands |= between;
+  stop = (stop | between) & packet.alive;
+  leave &= packet.alive & ~stop;
+  if ((stop | leave) != 0) retire(packet, stop, leave);
+  const std::uint32_t recorded = batch_.points.empty() ? 0 : packet.alive & ~staying;
+  for_lanes(recorded, [&](int lane) { add_inner_points(medium_, packet, lane, *batch_.points[packet.ray[lane]]); });
+  add_step(packet);
+  if (recorded != 0) keep_points(packet, recorded);
+  if ((stop | leave) != 0 && packet.alive != 0) compact(packet);
+}
+
+/// Repeats the step that leaves the extent, with the length that ends on its face.
+template <bool differentials>
+HWY_NOINLINE void Kernel<differentials>::land(Packet& packet) {
+  packet.vectors = packet_rays / lanes;
+  for (int lane = static_cast<int>(hwy::PopCount(packet.alive)); lane < packet_rays; ++lane)
+    copy_end(packet, 0, packet, lane);
+  compact(packet);
+  FaceLanding landing;
+  aim_along_chord(medium_, packet, landing);
+  aim_along_path(medium_, packet, landing);
+  take_step<differentials>(medium_, packet);
+  move_to_faces(medium_, packet, landing);
+  arrive(packet, landing);
+}
+
+/// Writes back the rays, which are on the extent's faces.
+template <bool differentials>
+void Kernel<differentials>::arrive(Packet& packet, const FaceLanding& landing) {
+  for_lanes(packet.alive, [&](int lane) {
+    KernelRay& ray = rays_[packet.ray[lane]];
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.place.brick[axis] = packet.brick[axis][lane];
+      ray.place.position[axis] = packet.p_next[axis][lane];
+      ray.direction[axis] = packet.v_next[axis][lane];
+    }
+    ray.axis = static_cast<std::int8_t>(landing.axis[lane]);
+    ray.length += double{packet.time[lane]};
+    ray.log_radiance_scale += packet.change_of_step[lane];
+    ++ray.steps;
+    samples_ += Composition::kicks;
+  });
+  packet.alive = 0;
+}
+
+template <bool differentials>
+std::uint64_t Kernel<differentials>::run() {
+  for (Packet& packet : packets_) fill(packet);
+  for (bool busy = true; busy;) {
+    busy = false;
+    for (Packet& packet : packets_) {
+      if (packet.alive == 0) continue;
+      busy = true;
+      step(packet);
+      if (HWY_LIKELY(packet.alive != 0)) continue;
+      Packet& leaving = leaving_[&packet - packets_];
+      if (leaving.alive != 0) land(leaving);
+      fill(packet);
+    }
+  }
+  return samples_;
+}
+
+std::uint64_t trace(const PacketMedium& medium, KernelRays& batch) {
+  return batch.differentials.empty() ? Kernel<false>(medium, batch).run() : Kernel<true>(medium, batch).run();
+}
+
+#endif
+
+int vector_lanes() { return lanes; }
+
+}  // namespace tensorray::packets::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tensorray::packets {
+
+HWY_EXPORT(trace);
+HWY_EXPORT(vector_lanes);
+
+namespace {
+
+/// Zen 4 does the operations of AVX-512 in two halves: the kernel, of all code with vectors, is faster with AVX2 there.
+bool is_zen4() {
+#if defined(__x86_64__) && defined(__GNUC__)
+  __builtin_cpu_init();
+  return __builtin_cpu_is("amd") && __builtin_cpu_supports("avx512f") &&
+         !__builtin_cpu_supports("avx512vp2intersect");  // Zen 5 has it.
+#else
+  return false;
+#endif
+}
+
+/// Whether the kernel does not use vectors wider than AVX2's.
+bool prefers_avx2 = is_zen4();
+
+/// The function for the instruction set that is selected. It must be exported (HWY_EXPORT).
+#if HWY_TARGETS & HWY_AVX2
+#define KERNEL_DISPATCH(function) (prefers_avx2 ? &N_AVX2::function : &HWY_DYNAMIC_DISPATCH(function))
+#else
+#define KERNEL_DISPATCH(function) HWY_DYNAMIC_DISPATCH(function)
+#endif
+
+#if defined(__SSE__)
+/// Denormal numbers count as zero during the lifetime of this object, because arithmetic with them is many times
+/// slower.
+class WithoutDenormals {
+ public:
+  WithoutDenormals() { _mm_setcsr(before_ | 0x8040); }
+  ~WithoutDenormals() { _mm_setcsr(before_); }
+  WithoutDenormals(const WithoutDenormals&) = delete;
+  WithoutDenormals& operator=(const WithoutDenormals&) = delete;
+
+ private:
+  const unsigned before_ = _mm_getcsr();
+};
+#else
+struct WithoutDenormals {};
+#endif
+
+/// The processor's instruction sets.
+const std::vector<std::int64_t>& targets() {
+  static const std::vector<std::int64_t> all = [] {
+    std::vector<std::int64_t> with_vectors = hwy::SupportedAndGeneratedTargets();
+    with_vectors.erase(std::remove(with_vectors.begin(), with_vectors.end(), HWY_SCALAR), with_vectors.end());
+    return with_vectors;
+  }();
+  return all;
+}
+
+}  // namespace
+
+int lane_count() { return KERNEL_DISPATCH(vector_lanes)(); }
+
+std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
+  const PacketMedium medium(field, settings);
+  [[maybe_unused]] const WithoutDenormals guard;
+  return KERNEL_DISPATCH(trace)(medium, batch);
+}
+
+std::vector<std::string> instruction_sets() {
+  std::vector<std::string> names;
+  for (const std::int64_t target : targets()) names.push_back(hwy::TargetName(target));
+  return names;
+}
+
+void use_instruction_set(const std::string& name) {
+  const auto found = std::find_if(targets().begin(), targets().end(),
+                                  [&](std::int64_t target) { return name == hwy::TargetName(target); });
+  if (found == targets().end() && !name.empty())
+    throw std::invalid_argument("this processor has no instruction set \"" + name + "\"");
+  prefers_avx2 = name.empty() && is_zen4();
+  hwy::SetSupportedTargetsForTest(name.empty() ? 0 : *found);
+}
+
+}  // namespace tensorray::packets
+#endif

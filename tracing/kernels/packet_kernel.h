@@ -1,0 +1,80 @@
+#pragma once
+/// @file tracing/kernels/packet_kernel.h
+/// Traces many rays at once inside a cubic field, by `splitting4`: the default. Steps are those of scalar_tracer.h, in
+/// single precision and in the widest vectors of the processor. docs/dev/performance_notes.md explains the method.
+/// The code for vectors is in the headers *-inl.h, which are compiled once for each instruction set: a step is in
+/// packet_step-inl.h, the tensor at a point in packet_splines-inl.h.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tracing/bending/ray_record.h"
+#include "volumes/bricks/tensor_field.h"
+
+namespace tensorray::packets {
+
+/// A ray in the field.
+struct KernelRay {
+  BrickPoint place;
+  std::array<float, 3> direction;  ///< V; unit, world axes.
+  float strength = 0;              ///< σ = s · scale.
+  float norm = 0;                  ///< Norm of the deviator of T at the start; 0 if it does not make steps shorter.
+  double length = 0;               ///< Length of the path, world units; the kernel adds to it.
+  std::uint32_t steps = 0;         ///< Number of steps; the kernel adds to it.
+  float log_radiance_scale = 0;    ///< Λ in the kernel; not of rays with differentials.
+  std::int8_t axis = -1;           ///< Axis of the face of the extent where the ray left; -1: it has not left.
+  float step = 0;                  ///< If the ray has not left: length of its next step, world units.
+  bool lands = false;              ///< Whether this step meets a surface. Without it, the step would end at
+  std::array<float, 3> end{}, end_direction{};  ///< a position as that of `place`, with this direction.
+};
+
+/// Derivatives of a ray along two parameters: voxels, in index space, and radians.
+struct KernelDifferential {
+  float position[2][3], direction[2][3];
+};
+
+struct KernelRays {
+  std::vector<KernelRay> rays;
+  std::vector<KernelDifferential> differentials;  ///< One for every ray, or empty.
+  std::vector<std::vector<StepPoint>*> points;    ///< One list for every ray, to which the kernel adds; or empty.
+};
+
+/// Whether the step from one point to another meets a surface, so that packets cannot take it. Called where surfaces
+/// are near.
+using MeetsSurface = std::function<bool(const Eigen::Vector3d& from, const Eigen::Vector3d& to)>;
+
+struct KernelSettings {
+  float step = 0;       ///< Voxels; 0: automatic.
+  float tolerance = 0;  ///< Of automatic steps, voxels.
+  std::uint32_t max_steps = 0;
+  float max_length = 0;          ///< World units; limit of the whole path, `KernelRay::length` included.
+  MeetsSurface meets_surface;    ///< Null if there are no surfaces within the field.
+  Eigen::AlignedBox3d surfaces;  ///< Box around these surfaces, index space.
+};
+
+/// Traces every ray to the face of the extent where it leaves (then `axis` is set and the ray is on that face), or to
+/// the point before a step that the kernel does not take. These are steps onto a surface, beyond the greatest length or
+/// number of steps, those that leave the extent between their ends or across its edges, and where σ·T cannot be
+/// followed; for rays with differentials, also all steps out of the extent. The result of a ray depends on that ray
+/// alone, not on its neighbours. Tracing is fastest if rays of one origin, or of neighbouring origins, stand next to
+/// each other.
+/// @param field  Cubic.
+/// @return the number of tensor samples.
+std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch);
+
+/// Names of the processor's vector instruction sets for which the kernel is compiled, the widest first. The widest is
+/// used, unless a narrower one is faster.
+std::vector<std::string> instruction_sets();
+
+/// Selects one of `instruction_sets()`; empty: the fastest. For tests and benchmarks.
+/// Threads: do not call it while rays are traced.
+void use_instruction_set(const std::string& name);
+
+/// Number of lanes of a vector with the selected instruction set. 1: the processor has no vectors that Highway knows,
+/// and `run` must not be called.
+int lane_count();
+
+}  // namespace tensorray::packets

@@ -1,0 +1,151 @@
+/// @file tracing/kernels/packet_landing-inl.h
+/// The last step of rays in the extent, which ends on a face of the extent, and the path within a step.
+
+// Included once for each instruction set: see Highway's foreach_target.h.
+#if defined(TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE) == defined(HWY_TARGET_TOGGLE)
+#ifdef TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE
+#undef TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE
+#else
+#define TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE
+#endif
+
+#include <hwy/highway.h>
+
+#include "tracing/kernels/packet_step-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tensorray::packets::HWY_NAMESPACE {
+
+/// The last step of rays: the length of the whole step, which is too long, its chord, and the axis of the face where
+/// they leave.
+struct alignas(64) FaceLanding {
+  PerRay longest, chord[3], axis;
+};
+
+/// Position, along an axis, of the extent's face through which rays along `chord` leave.
+HWY_INLINE F face(const PacketMedium& medium, const Packet& packet, const FaceLanding& landing, int axis, int at) {
+  const F margin = set(medium.margin[axis]);
+  return hn::IfThenElse(hn::Gt(load(landing.chord[axis], at), hn::Zero(floats)),
+                        hn::Add(load(packet.high[axis], at), margin), hn::Sub(load(packet.low[axis], at), margin));
+}
+
+/// Finds the face that the chord of the whole step meets, and the approximate length of a step that ends there.
+static HWY_NOINLINE void aim_along_chord(const PacketMedium& medium, Packet& packet, FaceLanding& landing) {
+  const F zero = hn::Zero(floats), one = set(1);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F longest = load(packet.time, i);
+    store(longest, landing.longest, i);
+    store(sub(load(packet.p_next, i), load(packet.p, i)), landing.chord, i);
+    const auto part = [&](int axis) HWY_ATTR {
+      const F along = load(landing.chord[axis], i);
+      const F gap = hn::Sub(face(medium, packet, landing, axis, i), load(packet.p[axis], i));
+      return hn::IfThenElse(hn::Gt(hn::Abs(along), zero), hn::Div(gap, along), set(1e30f));
+    };
+    const F x = part(0), y = part(1), z = part(2), nearest = hn::Min(hn::Min(x, y), z);
+    store(hn::IfThenElse(hn::Eq(x, nearest), zero, hn::IfThenElse(hn::Eq(y, nearest), one, set(2))), landing.axis, i);
+    store(hn::Mul(longest, hn::Min(hn::Max(nearest, zero), one)), packet.time, i);
+  }
+}
+
+/// Improves the lengths by the path between the ends of the whole step.
+static HWY_NOINLINE void aim_along_path(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
+  const F one = set(1), two = set(2), three = set(3);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F longest = load(landing.longest, i), axis = load(landing.axis, i);
+    const auto of_axis = [&](const F3& v) HWY_ATTR {
+      return hn::IfThenElse(hn::Eq(axis, hn::Zero(floats)), v.x, hn::IfThenElse(hn::Eq(axis, one), v.y, v.z));
+    };
+    const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, i); };
+    const F from = of_axis(load(packet.p, i)), way = hn::Sub(of_axis(load(packet.p_next, i)), from);
+    const F gap = hn::Sub(of_axis({on_face(0), on_face(1), on_face(2)}), from);
+    const F a = hn::Mul(longest, of_axis(load(packet.u, i))), b = hn::Mul(longest, of_axis(load(packet.u_next, i)));
+    // The path is a t + (3 way − 2 a − b) t² + (a + b − 2 way) t³.
+    const F square = hn::Sub(hn::MulSub(three, way, hn::Mul(two, a)), b), cube = hn::NegMulAdd(two, way, hn::Add(a, b));
+    F t = hn::Div(load(packet.time, i), longest);
+    for (int n = 0; n < 3; ++n) {
+      const F at = hn::Mul(t, hn::MulAdd(t, hn::MulAdd(t, cube, square), a));
+      const F slope = hn::MulAdd(t, hn::MulAdd(hn::Mul(three, cube), t, hn::Mul(two, square)), a);
+      const F change = hn::Div(hn::Sub(gap, at), slope);
+      // Light nearly parallel to the face keeps the length by the chord.
+      t = hn::IfThenElse(hn::Le(hn::Abs(change), one), hn::Min(hn::Max(hn::Add(t, change), hn::Zero(floats)), one), t);
+    }
+    store(hn::Mul(t, longest), packet.time, i);
+  }
+}
+
+/// Moves the rays straight to their faces, but not those nearly parallel to them.
+static HWY_NOINLINE void move_to_faces(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F zero = hn::Zero(floats), axis = load(landing.axis, i);
+    const auto of_axis = [&](F a, F b, F c) HWY_ATTR {
+      return hn::IfThenElse(hn::Eq(axis, zero), a, hn::IfThenElse(hn::Eq(axis, set(1)), b, c));
+    };
+    const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, i); };
+    const F3 to = load(packet.p_next, i), u = load(packet.u_next, i);
+    const F gap = hn::Sub(of_axis(on_face(0), on_face(1), on_face(2)), of_axis(to.x, to.y, to.z));
+    const F way = hn::Div(gap, of_axis(u.x, u.y, u.z));
+    const F rest = hn::IfThenElseZero(hn::Le(hn::Abs(way), load(landing.longest, i)), way);
+    store(mul_add(rest, u, to), packet.p_next, i);
+    store(hn::Add(load(packet.time, i), rest), packet.time, i);
+  }
+}
+
+/// The path at the part t of the step (see path_weights), in index space.
+HWY_INLINE F3 path_at(const Packet& packet, double t, int at) {
+  const PathWeights weights = path_weights(t);
+  const F time = load(packet.time, at);
+  const auto along = [&](double weight, const F3& v)
+                         HWY_ATTR { return mul(hn::Mul(set(static_cast<float>(weight)), time), v); };
+  const auto at_end = [&](double weight, const F3& p) HWY_ATTR { return mul(set(static_cast<float>(weight)), p); };
+  return add(add(at_end(weights.from, load(packet.p, at)), along(weights.from_direction, load(packet.u, at))),
+             add(at_end(weights.to, load(packet.p_next, at)), along(weights.to_direction, load(packet.u_next, at))));
+}
+
+/// The lanes that turn on their way along an axis, or may do so, as bits: there the path's cubic polynomial may cross a
+/// face more than once.
+static HWY_NOINLINE std::uint32_t turning(const Packet& packet, int axis) {
+  std::uint32_t result = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F way = hn::Sub(load(packet.p_next[axis], i), load(packet.p[axis], i)), time = load(packet.time, i);
+    const auto is_steady = [&](const PerRay& slope) HWY_ATTR {  // Sufficient where it holds at both ends.
+      const F part = hn::Div(hn::Mul(time, load(slope, i)), way);
+      return hn::And(hn::Ge(part, hn::Zero(floats)), hn::Le(part, set(3)));
+    };
+    result |= to_bits(hn::Not(hn::And(is_steady(packet.u[axis]), is_steady(packet.u_next[axis]))), i);
+  }
+  return result;
+}
+
+/// The lanes whose points are outside the extent along an axis, as bits.
+HWY_INLINE std::uint32_t outside(const PacketMedium& medium, const Packet& packet, const PerRay& points, int axis) {
+  std::uint32_t result = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F x = load(points, i), margin = set(medium.margin[axis]);
+    result |= to_bits(hn::Or(hn::Lt(hn::Add(x, margin), load(packet.low[axis], i)),
+                             hn::Gt(hn::Sub(x, margin), load(packet.high[axis], i))),
+                      i);
+  }
+  return result;
+}
+
+/// The lanes whose steps leave the extent between their ends, as bits. Lanes of `leave` that leave it only once, along
+/// one axis, are not among them: the packet can find where they leave.
+static HWY_NOINLINE std::uint32_t outside_between(const PacketMedium& medium, const Packet& packet,
+                                                  std::uint32_t leave) {
+  std::uint32_t any = 0, edges = 0;
+  alignas(64) PerRay points[3][3];
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < packet.vectors * lanes; i += lanes) store(path_at(packet, 0.25 * (k + 1), i), points[k], i);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::uint32_t along = outside(medium, packet, packet.p_next[axis], axis);
+    for (const auto& point : points) along |= outside(medium, packet, point[axis], axis);
+    edges |= along & (any | turning(packet, axis));
+    any |= along;
+  }
+  return (any & ~leave) | edges;
+}
+
+}  // namespace tensorray::packets::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,42 @@
+#pragma once
+/// @file tracing/scale/auto_scale.h
+/// Chooses a field's scale (BendingSettings::scale), and the direction of the light, so that the light shows the field.
+///
+/// Parallel light at s = 0.2 lands on a plane across it, a quarter of the volume's depth behind the volume. What one
+/// sees there is not how far light turns, but how differently neighbouring light turns: by which factor the light about
+/// a ray becomes wider or narrower, |det(∂landing/∂start)|. With x, the absolute value of its logarithm, the ray shows
+/// x e^(1−x) of the field: 1 for a factor of e, less for a smaller change, and less for a greater one, where light is
+/// tangled. Rays that do not land show nothing.
+
+#include "base/process/progress.h"
+#include "renderer/lights/beam.h"
+#include "tracing/bending/bending.h"
+#include "tracing/bending/geometry.h"
+
+namespace tensorray {
+
+struct AutoScale {
+  double scale = 1;
+  double median_turn = 0;    ///< Turn of the median bent ray from start to end, radians, at s = 0.2 and this scale.
+  double bent_fraction = 0;  ///< Fraction of the probe rays that the field turns at all.
+  double shown = 0;          ///< What the mean ray shows of the field, 0 to 1.
+};
+
+/// Finds the least scale that shows 0.85 of what the best scale shows. Scales at which the median ray turns by more
+/// than 0.4 rad are left out. Singular points, which tangle at any scale, do not decide, and a field whose structure
+/// fills a small part of the volume is judged by that part. If the field only turns light as a whole, the median ray
+/// turns by 0.15 to 0.4 rad. A field that turns no ray gets scale 1. Deterministic; runs on all threads.
+/// @param geometry  Bounds and cut, without a plate. @throw Cancelled.
+AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress);
+
+struct AutoDirection {
+  Eigen::Vector3d direction;
+  AutoScale scale;
+};
+
+/// Of the six directions along the world's axes the one with the greatest `shown`, each at the scale that choose_scale
+/// finds. −z if none shows anything. @throw as above.
+AutoDirection choose_direction(const TensorField& field, const Geometry& geometry, const Eigen::Vector3d& up,
+                               const Progress& progress);
+
+}  // namespace tensorray
