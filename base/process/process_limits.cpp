@@ -92,14 +92,29 @@ double container_memory(const fs::path& root) {
   return bytes;
 }
 
+/// Bytes that this process has. @param column  What counts, in /proc/self/statm.
+double used_memory(std::size_t column) {
+  const std::vector<double> pages = numbers_in("/proc/self/statm");
+  return column < pages.size() ? pages[column] * static_cast<double>(sysconf(_SC_PAGESIZE)) : 0;
+}
+
 /// What is left of a limit of this process, of which libraries and stacks have a part, too.
-/// @param column  What counts, in /proc/self/statm.
 double own_limit(decltype(RLIMIT_AS) resource, std::size_t column) {
   rlimit limit{};
   if (getrlimit(resource, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return unlimited;
-  const std::vector<double> pages = numbers_in("/proc/self/statm");
-  const double used = column < pages.size() ? pages[column] * static_cast<double>(sysconf(_SC_PAGESIZE)) : 0;
-  return std::max(0.0, static_cast<double>(limit.rlim_cur) - used);
+  return std::max(0.0, static_cast<double>(limit.rlim_cur) - used_memory(column));
+}
+
+/// Lowers the limit of this process's data.
+void limit_data(double bytes) {
+#ifndef TENSORRAY_SANITIZED  // Sanitizers reserve memory many times over.
+  rlimit limit{};
+  if (bytes >= 0x1p62 || getrlimit(RLIMIT_DATA, &limit) != 0) return;
+  limit.rlim_cur = std::min(limit.rlim_cur, static_cast<rlim_t>(bytes));
+  setrlimit(RLIMIT_DATA, &limit);
+#else
+  static_cast<void>(bytes);
+#endif
 }
 
 }  // namespace
@@ -118,15 +133,14 @@ MemoryLimit memory_limit(const fs::path& root) {
                            [](const MemoryLimit& a, const MemoryLimit& b) { return a.bytes < b.bytes; });
 }
 
-void limit_memory() {
-#ifndef TENSORRAY_SANITIZED  // Sanitizers reserve memory many times over.
-  const double most = 0.875 * memory_limit().bytes;
-  rlimit limit{};
-  if (most >= 0x1p62 || getrlimit(RLIMIT_DATA, &limit) != 0) return;
-  limit.rlim_cur = std::min(limit.rlim_cur, static_cast<rlim_t>(most));
-  setrlimit(RLIMIT_DATA, &limit);
-#endif
+void limit_memory() { limit_data(0.875 * memory_limit().bytes); }
+
+ExtraMemoryLimit::ExtraMemoryLimit(double bytes) {
+  getrlimit(RLIMIT_DATA, &before_);
+  limit_data(used_memory(5) + bytes);
 }
+
+ExtraMemoryLimit::~ExtraMemoryLimit() { setrlimit(RLIMIT_DATA, &before_); }
 
 void require_stack() {
   constexpr rlim_t least = 256 << 10;  // Twice what renders and imports were seen to need.

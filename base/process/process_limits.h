@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <string>
 
+#include <sys/resource.h>
+
 namespace tensorray {
 
 /// The processors that this process may use, at least 1: those of its affinity, or fewer where a container has a
@@ -25,6 +27,19 @@ MemoryLimit memory_limit(const std::filesystem::path& root = "/");
 /// Has allocations fail where this process alone would take most of memory_limit(), for programs that read files which
 /// may announce any size: the system would end this program otherwise, or others. Does nothing under sanitizers.
 void limit_memory();
+
+/// Until it is destroyed, allocations fail where this process would take so many bytes more than it has: for the
+/// reading of a file whose size is known. Does nothing under sanitizers.
+class ExtraMemoryLimit {
+ public:
+  explicit ExtraMemoryLimit(double bytes);
+  ~ExtraMemoryLimit();
+  ExtraMemoryLimit(const ExtraMemoryLimit&) = delete;
+  ExtraMemoryLimit& operator=(const ExtraMemoryLimit&) = delete;
+
+ private:
+  rlimit before_{};
+};
 
 /// Checks that stacks are large enough: one that ends cannot be reported.
 /// @throw std::runtime_error with the fix.

@@ -29,14 +29,12 @@
 #include "scenes/source/frames.h"
 #include "scenes/source/overrides.h"
 #include "tests/fuzz/view_targets.h"
-#include "tools/import/cases/ensight_files.h"
-#include "tools/import/cases/plot3d_layout.h"
+#include "tools/import/cases/ensight.h"
 #include "tools/import/hdf5/xdmf_document.h"
 #include "tools/import/hdf5/xdmf_values.h"
 #include "tools/import/lattice_files/lattice_files.h"
 #include "tools/import/vtk/vtk_messages.h"
-#include "tools/import/vtk_formats/netcdf_size.h"
-#include "tools/import/vtk_formats/vtk_counts.h"
+#include "tools/import/vtk_formats/netcdf_end.h"
 #include "volumes/vdb/file_bytes.h"
 #include "volumes/vdb/vdb_tree_check.h"
 
@@ -203,23 +201,8 @@ bool read_ensight(const std::string& bytes) {
   });
 }
 
-/// Both are for any bytes.
-bool read_vtk_counts(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) {
-    const std::string xml = impossible_xml_count(path), legacy = impossible_legacy_count(path);
-    if (!xml.empty() || !legacy.empty()) throw std::runtime_error(xml + legacy);
-  });
-}
-
-bool read_plot3d(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) {
-    const Plot3dLayout layout = plot3d_grid_layout(path);
-    expect_one_line([&] { plot3d_q_layout(path, layout.size); });
-  });
-}
-
 bool read_netcdf(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) { netcdf_size(path); });
+  return read_file(bytes, [](const std::filesystem::path& path) { require_whole_netcdf(path); });
 }
 
 /// The first byte chooses how the file stores its tree.
@@ -256,9 +239,7 @@ const std::vector<FuzzTarget>& fuzz_targets() {
                                                {"metaimage", read_metaimage},
                                                {"xdmf", read_xdmf},
                                                {"ensight", read_ensight},
-                                               {"plot3d", read_plot3d},
                                                {"netcdf", read_netcdf},
-                                               {"vtk_counts", read_vtk_counts},
                                                {"vdb_tree", read_vdb_tree},
                                                {"http", read_http},
                                                {"page", read_page_message}};

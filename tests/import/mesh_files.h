@@ -2,6 +2,7 @@
 /// @file tests/import/mesh_files.h
 /// Temporary files, the data sets, and reading and writing of bytes, for the tests of mesh readers.
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -9,8 +10,11 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/process/process_limits.h"
 #include "tests/data_folder.h"
 
 namespace tensorray::test {
@@ -58,6 +62,46 @@ std::string error_of(Act&& act) {
   }
   return {};
 }
+
+/// The same in a child process with limits, as the program reads (child_process.h): a reader that a signal ends gives a
+/// message, and not the end of all other tests. Other exceptions count as well.
+template <typename Act>
+std::string error_in_child(const std::filesystem::path& path, Act&& act) {
+  int ends[2];
+  EXPECT_EQ(pipe(ends), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    limit_memory();
+    const rlimit seconds{60, 60};
+    setrlimit(RLIMIT_CPU, &seconds);
+    std::string text;
+    try {
+      text = error_of(act);
+    } catch (const std::exception& error) {
+      text = error.what();
+    }
+    _exit(write(ends[1], text.data(), text.size()) == static_cast<ssize_t>(text.size()) ? 0 : 1);
+  }
+  close(ends[1]);
+  std::string text(4096, '\0');
+  std::size_t size = 0;
+  for (ssize_t count = 1; count > 0 && size < text.size();
+       size += static_cast<std::size_t>(std::max<ssize_t>(0, count)))
+    count = read(ends[0], &text[size], text.size() - size);
+  close(ends[0]);
+  int status = 0;
+  waitpid(child, &status, 0);
+  if (WIFSIGNALED(status)) return path.string() + ": reading it ended the reader";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  text.resize(size);
+  EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+  return text;
+}
+
+/// Expects that a damaged file is refused with these words, or ends the reader: what VTK does not check depends on its
+/// version.
+#define EXPECT_DAMAGED(error, words) \
+  EXPECT_THAT(error, testing::AnyOf(testing::HasSubstr(words), testing::HasSubstr("ended the reader")))
 
 }  // namespace tensorray
 

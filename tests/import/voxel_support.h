@@ -6,9 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -16,9 +14,8 @@
 
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include "tests/data_folder.h"
+#include "tests/import/mesh_files.h"
 #include "tools/import/lattices/lattice.h"
 
 namespace tensorray::test {
@@ -36,16 +33,6 @@ class TemporaryFile : public std::filesystem::path {
 
   void write(const std::string& contents) const { std::ofstream(*this, std::ios::binary) << contents; }
 };
-
-inline std::filesystem::path data_file(const std::string& name) { return data_folder() / name; }
-
-#define TENSORRAY_NEEDS(path) \
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not here: set TENSORRAY_DATA"
-
-inline std::string contents_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 template <class Number>
 std::string bytes_of(const std::vector<Number>& numbers) {
@@ -133,6 +120,14 @@ inline void expect_error(const std::function<void()>& run, const std::vector<std
     EXPECT_EQ(text.find('\n'), std::string::npos) << text;
     for (const std::string& word : words) EXPECT_NE(text.find(word), std::string::npos) << text << "\nlacks " << word;
   }
+}
+
+/// Expects that a file with these bytes is refused, in one line with its name and `words`.
+inline void refuses(Lattice (*open)(const std::filesystem::path&), const std::string& name, const std::string& bytes,
+                    std::vector<std::string> words = {}) {
+  const TemporaryFile file(name, bytes);
+  words.insert(words.begin(), name);
+  expect_error([&] { tensors_of(open(file), "fsl"); }, words);
 }
 
 /// A rotation without any symmetry.

@@ -22,7 +22,15 @@
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLDataSetWriter.h>
 
+#include "tests/import/mesh_files.h"
+#include "tools/import/vtk_source/vtk_source.h"
+
 namespace tensorray {
+
+/// The error of reading a file; empty if it is read.
+inline std::string read_error(const std::filesystem::path& path) {
+  return error_in_child(path, [&] { read_vtk_source(path); });
+}
 
 /// The value of component c at a position.
 inline double number(const double* x, int c) { return 3 * x[0] - 5 * x[1] + 7 * x[2] + c; }

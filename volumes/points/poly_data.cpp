@@ -7,38 +7,30 @@
 namespace tensorray {
 namespace {
 
-const std::string magic = "tensorray poly data 1\n";
+const std::string lines_magic = "tensorray poly lines 1\n";
 
-class PolyDataWriter {
+/// Writes sizes and what they are of, or reads them back: `items` of the same code.
+class LinesWriter {
  public:
-  explicit PolyDataWriter(const std::filesystem::path& path) : file_(path, std::ios::binary | std::ios::trunc) {
-    file_.write(magic.data(), static_cast<std::streamsize>(magic.size()));
+  explicit LinesWriter(const std::filesystem::path& path) : file_(path, std::ios::binary | std::ios::trunc) {}
+
+  /// A vector or a text.
+  template <class Items>
+  void copy(Items& items) {
+    std::uint64_t count = items.size();
+    number(count);
+    bytes(items.data(), items.size() * sizeof *items.data());
   }
 
-  void number(std::uint64_t number) { bytes(&number, sizeof number); }
-
-  void text(const std::string& text) {
-    number(text.size());
-    bytes(text.data(), text.size());
+  template <class Item>
+  void begin_list(const std::vector<Item>& list) {
+    std::uint64_t count = list.size();
+    number(count);
   }
 
-  void array(const DataView& array) {
-    number(static_cast<std::uint64_t>(array.components));
-    number(array.values.index());
-    std::visit(
-        [&](const auto& span) {
-          number(span.size);
-          bytes(span.data, span.size * sizeof *span.data);
-        },
-        array.values);
-  }
-
-  void arrays(const Named<DataView>& arrays) {
-    number(arrays.size());
-    for (const auto& [name, values] : arrays) {
-      text(name);
-      array(values);
-    }
+  template <class Number>
+  void number(Number& number) {
+    bytes(&number, sizeof number);
   }
 
   void close() {
@@ -54,78 +46,40 @@ class PolyDataWriter {
   std::ofstream file_;
 };
 
-class PolyDataReader {
+class LinesReader {
  public:
-  explicit PolyDataReader(const std::filesystem::path& path)
-      : file_(path, std::ios::binary), left_(std::filesystem::file_size(path)) {
-    std::string begin(magic.size(), ' ');
-    bytes(&begin[0], begin.size());
-    if (begin != magic) throw std::runtime_error("the temporary file is of another version of the program");
+  explicit LinesReader(const std::filesystem::path& path)
+      : file_(path, std::ios::binary), left_(std::filesystem::file_size(path)) {}
+
+  template <class Items>
+  void copy(Items& items) {
+    items.resize(count(sizeof *items.data()));
+    bytes(items.data(), items.size() * sizeof *items.data());
   }
 
-  std::uint64_t number() {
-    std::uint64_t number = 0;
-    bytes(&number, sizeof number);
-    return number;
-  }
-
-  /// Reads how many elements follow. Each takes at least `size` bytes.
-  std::size_t count(std::size_t size) {
-    const std::uint64_t count = number();
-    if (count > left_ / size) fail();
-    return static_cast<std::size_t>(count);
-  }
-
-  std::string text() {
-    std::string text(count(1), ' ');
-    bytes(&text[0], text.size());
-    return text;
-  }
-
-  DataArray array() {
-    DataArray array;
-    array.components = static_cast<int>(number());
-    switch (number()) {
-      case 0:
-        array.values = numbers<double>();
-        break;
-      case 1:
-        array.values = numbers<float>();
-        break;
-      case 2:
-        array.values = numbers<std::int32_t>();
-        break;
-      case 3:
-        array.values = numbers<std::uint8_t>();
-        break;
-      default:
-        fail();
-    }
-    return array;
-  }
-
-  Named<DataArray> arrays() {
-    Named<DataArray> arrays(count(1));
-    for (auto& [name, values] : arrays) {
-      name = text();
-      values = array();
-    }
-    return arrays;
+  template <class Item>
+  void begin_list(std::vector<Item>& list) {
+    list.resize(count(1));
   }
 
   template <class Number>
-  std::vector<Number> numbers() {
-    std::vector<Number> numbers(count(sizeof(Number)));
-    bytes(numbers.data(), numbers.size() * sizeof(Number));
-    return numbers;
+  void number(Number& number) {
+    bytes(&number, sizeof number);
   }
 
  private:
   [[noreturn]] static void fail() { throw std::runtime_error("the temporary file is cut off; the disk may be full"); }
 
+  /// How many elements follow. Each takes at least `size` bytes.
+  std::size_t count(std::size_t size) {
+    std::uint64_t count = 0;
+    number(count);
+    if (count > left_ / size) fail();
+    return static_cast<std::size_t>(count);
+  }
+
   void bytes(void* data, std::size_t size) {
-    if (size > left_) fail();
-    if (!file_.read(static_cast<char*>(data), static_cast<std::streamsize>(size))) fail();
+    if (size > left_ || !file_.read(static_cast<char*>(data), static_cast<std::streamsize>(size))) fail();
     left_ -= size;
   }
 
@@ -133,10 +87,20 @@ class PolyDataReader {
   std::uintmax_t left_;  ///< Bytes from here to the end of the file.
 };
 
-Named<DataView> views_of(const Named<DataArray>& arrays) {
-  Named<DataView> views;
-  for (const auto& [name, values] : arrays) views.emplace_back(name, view_of(values));
-  return views;
+template <class File>
+void copy_lines(File& file, std::string& begin, PolyLines& lines) {
+  static_assert(sizeof(std::size_t) == sizeof(std::uint64_t), "line ends are 64 bits in the file");
+  file.copy(begin);
+  file.copy(lines.points.numbers);
+  file.copy(lines.line_ends);
+  for (auto* const arrays : {&lines.point_data, &lines.line_data}) {
+    file.begin_list(*arrays);
+    for (auto& [name, values] : *arrays) {
+      file.copy(name);
+      file.number(values.components);
+      file.copy(values.numbers);
+    }
+  }
 }
 
 }  // namespace
@@ -153,45 +117,20 @@ DataView view_of(const DataArray& array) {
   return view;
 }
 
-PolyDataView view_of(const PolyData& data) {
-  return {view_of(data.points), data.has_lines ? &data.line_ends : nullptr, views_of(data.point_data),
-          views_of(data.line_data), data.texts};
-}
-
-void write_poly_data(const std::filesystem::path& path, const PolyDataView& data) {
-  PolyDataWriter writer(path);
-  writer.array(data.points);
-  writer.number(data.line_ends ? 1 : 0);
-  writer.number(data.line_ends ? data.line_ends->size() : 0);
-  if (data.line_ends)
-    for (const std::size_t end : *data.line_ends) writer.number(end);
-  writer.arrays(data.point_data);
-  writer.arrays(data.line_data);
-  writer.number(data.texts.size());
-  for (const auto& [name, lines] : data.texts) {
-    writer.text(name);
-    writer.number(lines.size());
-    for (const std::string& line : lines) writer.text(line);
-  }
+void write_poly_lines(const std::filesystem::path& path, PolyLines lines) {
+  LinesWriter writer(path);
+  std::string begin = lines_magic;
+  copy_lines(writer, begin, lines);
   writer.close();
 }
 
-PolyData read_poly_data(const std::filesystem::path& path) {
-  static_assert(sizeof(std::size_t) == sizeof(std::uint64_t), "line ends are 64 bits in the file");
-  PolyDataReader reader(path);
-  PolyData data;
-  data.points = reader.array();
-  data.has_lines = reader.number() != 0;
-  data.line_ends = reader.numbers<std::size_t>();
-  data.point_data = reader.arrays();
-  data.line_data = reader.arrays();
-  data.texts.resize(reader.count(1));
-  for (auto& [name, lines] : data.texts) {
-    name = reader.text();
-    lines.resize(reader.count(1));
-    for (std::string& line : lines) line = reader.text();
-  }
-  return data;
+PolyLines read_poly_lines(const std::filesystem::path& path) {
+  LinesReader reader(path);
+  PolyLines lines;
+  std::string begin;
+  copy_lines(reader, begin, lines);
+  if (begin != lines_magic) throw std::runtime_error("the temporary file is of another version of the program");
+  return lines;
 }
 
 }  // namespace tensorray

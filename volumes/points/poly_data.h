@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/points/poly_data.h
-/// Points or polylines with named values, and the file in which this program and `tensorray-import` exchange them.
+/// Points or polylines with named values, and the file in which `tensorray-import` hands polylines to this program.
 /// Users never see this file: its numbers have the machine's byte order, and both programs must have the same
 /// version.
 
@@ -37,30 +37,31 @@ using Named = std::vector<std::pair<std::string, Array>>;
 
 using Texts = std::vector<std::string>;
 
-/// `point_data` has one value per point; `line_data` one value per line.
-struct PolyData {
-  DataArray points{3, {}};             ///< World positions; double or single precision.
-  bool has_lines = false;              ///< False: each point is a vertex by itself.
-  std::vector<std::size_t> line_ends;  ///< For each line: the number of points up to its end, earlier lines included.
-  Named<DataArray> point_data, line_data;
+/// Points or polylines, whose numbers the caller owns: one value per point or per line.
+struct PolyDataView {
+  DataView points{3, {}};                               ///< World positions; double or single precision.
+  const std::vector<std::size_t>* line_ends = nullptr;  ///< Null: each point is a vertex by itself.
+  Named<DataView> point_data, line_data;
   Named<Texts> texts;  ///< Field data: notes about the whole.
 };
 
-/// PolyData that refers to numbers that the caller owns.
-struct PolyDataView {
-  DataView points{3, {}};
-  const std::vector<std::size_t>* line_ends = nullptr;  ///< Null: each point is a vertex by itself.
-  Named<DataView> point_data, line_data;
-  Named<Texts> texts;
+DataView view_of(const DataArray& array);
+
+/// Polylines, all of whose numbers are doubles.
+struct PolyLines {
+  struct Values {
+    int components = 1;
+    std::vector<double> numbers;
+  };
+  Values points{3, {}};
+  std::vector<std::size_t> line_ends;  ///< For each line: the number of points up to its end, earlier lines included.
+  Named<Values> point_data, line_data;
 };
 
-DataView view_of(const DataArray& array);
-PolyDataView view_of(const PolyData& data);
-
 /// Writes the file in place. @throw std::runtime_error with the reason (without the file) when the disk is full.
-void write_poly_data(const std::filesystem::path& path, const PolyDataView& data);
+void write_poly_lines(const std::filesystem::path& path, PolyLines lines);
 
 /// @throw std::runtime_error with the reason (without the file) if the file is of another kind or is cut off.
-PolyData read_poly_data(const std::filesystem::path& path);
+PolyLines read_poly_lines(const std::filesystem::path& path);
 
 }  // namespace tensorray

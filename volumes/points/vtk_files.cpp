@@ -61,12 +61,6 @@ void write(const std::filesystem::path& path, const PolyDataView& data) {
   }
 }
 
-std::vector<double>& doubles(DataArray& array) {
-  auto* const values = std::get_if<std::vector<double>>(&array.values);
-  if (!values) throw std::logic_error("tensorray-import hands back doubles");
-  return *values;
-}
-
 }  // namespace
 
 void write_vtp(const std::filesystem::path& path, const PointCloud& points) { write(path, view_of_cloud(points)); }
@@ -79,14 +73,14 @@ PolylineData read_vtp_lines(const std::filesystem::path& path, const std::set<st
   arguments.insert(arguments.end(), wanted.begin(), wanted.end());
   run_vtk_program(arguments, shared,
                   "reading it ended the reader; the file is damaged or cut off, or does not fit in memory");
-  PolyData data = read_poly_data(shared.path());
+  PolyLines data = read_poly_lines(shared.path());
   PolylineData lines;
-  const std::vector<double>& points = doubles(data.points);
+  const std::vector<double>& points = data.points.numbers;
   lines.points.reserve(points.size() / 3);
   for (std::size_t i = 0; i + 2 < points.size(); i += 3) lines.points.emplace_back(&points[i]);
   lines.line_ends = std::move(data.line_ends);
-  for (auto& [name, values] : data.point_data) lines.point_data[name] = std::move(values);
-  for (auto& [name, values] : data.line_data) lines.line_data[name] = std::move(values);
+  for (auto& [name, values] : data.point_data) lines.point_data[name] = {values.components, std::move(values.numbers)};
+  for (auto& [name, values] : data.line_data) lines.line_data[name] = {values.components, std::move(values.numbers)};
   return lines;
 }
 

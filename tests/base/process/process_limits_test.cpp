@@ -5,6 +5,8 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <memory>
+#include <new>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -119,6 +121,18 @@ TEST(ProcessLimitsTest, LimitsOfTheProcessCount) {
   setrlimit(RLIMIT_DATA, &before);
   EXPECT_NEAR(found.bytes, static_cast<double>(limit), 1 << 26);  // Some is taken meanwhile.
   EXPECT_NE(found.cause.find("ulimit -d"), std::string::npos);
+}
+
+TEST(ProcessLimitsTest, ExtraMemoryHasALimitForAWhile) {
+#ifdef TENSORRAY_SANITIZED
+  GTEST_SKIP() << "sanitizers have no such limit";
+#endif
+  const std::size_t bytes = std::size_t{200} << 20;
+  {
+    const ExtraMemoryLimit limit(0x1p26);
+    EXPECT_THROW(std::make_unique<char[]>(bytes), std::bad_alloc);
+  }
+  EXPECT_NO_THROW(std::make_unique<char[]>(bytes));
 }
 
 }  // namespace

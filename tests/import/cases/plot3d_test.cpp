@@ -3,16 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <vtkDataArray.h>
-#include <vtkDoubleArray.h>
-#include <vtkGradientFilter.h>
-#include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkStructuredGrid.h>
 
@@ -125,146 +119,67 @@ TEST(Plot3dTest, EveryForm) {
   }
 }
 
-TEST(Plot3dTest, FormsOfTheTwoFilesMayDifferAndFillingIsPassedOver) {
-  const TemporaryFolder folder;
-  Form grid, q;
-  grid.big_endian = grid.blanking = q.marks = true;
-  const auto mesh = read(folder, grid_bytes(grid) + std::string(17, '\0'), q_bytes(q) + std::string(484, '\0'));
-  expect_content(*mesh, grid);
-}
-
 TEST(Plot3dTest, PointsOfZeroDensityHaveNoVelocity) {
   const TemporaryFolder folder;
-  const Form form;
-  std::string q = q_bytes(form);
+  std::string q = q_bytes({});
   std::fill_n(q.begin() + 28, 4, '\0');  // the first density, which follows three sizes and four numbers
-  const auto mesh = read(folder, grid_bytes(form), q);
+  const auto mesh = read(folder, grid_bytes({}), q);
   EXPECT_TRUE(std::isnan(mesh->GetPointData()->GetArray("velocity")->GetComponent(0, 0)));
   EXPECT_FALSE(std::isnan(mesh->GetPointData()->GetArray("velocity")->GetComponent(1, 0)));
 }
 
-TEST(Plot3dTest, EveryTruncationIsAnError) {
+/// VTK's reader crashes on some of them.
+TEST(Plot3dTest, FilesThatAreCutOffOrDoNotFitAreErrors) {
   const TemporaryFolder folder;
-  for (int bits = 0; bits < 32; ++bits) {
+  const auto refuses = [&](const std::string& grid, const std::string& q, const std::string& name) {
+    const std::string error = error_in_child(folder / name, [&] { read(folder, grid, q); });
+    EXPECT_NE(error.find(name + ": "), std::string::npos) << error;
+  };
+  for (int bits = 0; bits < 32; bits += 3) {
     const Form form{bool(bits & 1), bool(bits & 2), bool(bits & 4), bool(bits & 8), bool(bits & 16)};
     const std::string grid = grid_bytes(form), q = q_bytes(form);
-    for (const std::size_t cut : {1, 4, 7, 100, 236, 241, 700, 710}) {
-      SCOPED_TRACE(testing::Message() << "form " << bits << ", cut " << cut);
-      if (cut < grid.size()) {
-        const std::string less = grid.substr(0, grid.size() - cut);
-        EXPECT_NE(error_of([&] { read(folder, less, q); }).find("grid.bin: "), std::string::npos);
-      }
-      if (cut < q.size()) {
-        const std::string less = q.substr(0, q.size() - cut);
-        EXPECT_NE(error_of([&] { read(folder, grid, less); }).find("q.bin: "), std::string::npos);
-      }
+    SCOPED_TRACE(bits);
+    for (const std::size_t cut : {12, 100, 700}) {  // A record mark is no number.
+      refuses(grid.substr(0, grid.size() - cut), q, "grid.bin");
+      refuses(grid, q.substr(0, q.size() - cut), "q.bin");
     }
   }
-}
-
-TEST(Plot3dTest, FilesThatDoNotFit) {
-  const TemporaryFolder folder;
   const std::string grid = grid_bytes({}), q = q_bytes({});
-  const auto error = [&](const std::string& grid_file, const std::string& q_file) {
-    return error_of([&] { read(folder, grid_file, q_file); });
-  };
-  EXPECT_NE(error(grid, q_bytes({}, {nx, nz, ny})).find("4x5x3"), std::string::npos);
-  EXPECT_NE(error(grid, grid).find("q.bin: "), std::string::npos);
-  EXPECT_NE(error(q, q).find("grid.bin: "), std::string::npos);
-  EXPECT_NE(error(grid, "").find("q.bin: is empty"), std::string::npos);
-  EXPECT_NE(error("3 3 3\n0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0\n", q).find("text"),
-            std::string::npos);
-  EXPECT_NE(error(grid + "not zero", q).find("grid.bin: "), std::string::npos);
-  std::string wild(grid.size(), '\x5a');
-  wild[0] = '\1';
-  EXPECT_NE(error(wild, q).find("no PLOT3D grid"), std::string::npos);
+  Form marks;
+  marks.marks = true;
+  refuses(grid, q_bytes({}, {nx, nz, ny}), "q.bin");
+  refuses(grid, q_bytes(marks), "q.bin");
+  refuses(grid, grid, "q.bin");
+  refuses(grid, "", "q.bin");
+  refuses("3 3 3\n0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0\n", q, "grid.bin");
+  refuses(grid + std::string(5000, '\0'), q, "grid.bin");
   std::string endless = grid;
   std::fill_n(endless.begin() + 12 + 40, 4, '\xff');
-  EXPECT_NE(error(endless, q).find("grid.bin: is damaged, or not of the form it seems: point 10 "), std::string::npos);
-  const float far = 1e31f;
-  std::string remote = grid;
-  std::memcpy(&remote[12 + 40], &far, sizeof far);
-  EXPECT_NE(error(remote, q).find("not finite, or beyond 1e30"), std::string::npos);
-
-  write_bytes(folder / "grid.bin", grid);
+  refuses(endless, q, "grid.bin");
+  for (const int size : {2000, 1 << 20}) {
+    Writer writer({});
+    write_sizes(writer, {}, {size, size, size});
+    refuses(writer.bytes(), q, "grid.bin");
+  }
   const std::string missing = error_of([&] { read_plot3d(folder / "grid.bin", folder / "none.bin"); });
   EXPECT_NE(missing.find("none.bin: does not exist"), std::string::npos) << missing;
 }
 
-/// 2⁶⁰ points of 16 bytes are 2⁶⁴ bytes, which overflows to 0 in 64 bits: the bare header looked like the whole file.
-TEST(Plot3dTest, SizesBeyondSixtyFourBitsAreDamage) {
+TEST(Plot3dTest, SeveralBlocksAreNamed) {
   const TemporaryFolder folder;
-  for (const bool count : {false, true}) {
-    Form form;
-    form.count = count;
-    Writer writer(form);
-    write_sizes(writer, form, {1 << 20, 1 << 20, 1 << 20});
-    const std::string error = error_of([&] { read(folder, writer.bytes(), q_bytes(form)); });
-    EXPECT_NE(error.find("grid.bin: is "), std::string::npos) << error;
-  }
-}
-
-TEST(Plot3dTest, SeveralBlocksAndTwoDimensionsAreNamed) {
-  const TemporaryFolder folder;
-  for (const bool marks : {false, true}) {
-    Form form;
-    form.marks = marks;
-    Writer blocks(form);
-    blocks.integer(2);
-    blocks.end_record();
-    for (const int size : {2, 2, 2, 3, 2, 2}) blocks.integer(size);
-    blocks.end_record();
-    for (const int count : {8, 12}) {
-      for (int i = 0; i < 3 * count; ++i) blocks.real(i);
-      blocks.end_record();
-    }
-    const std::string error = error_of([&] { read(folder, blocks.bytes(), q_bytes(form)); });
-    EXPECT_NE(error.find("2 blocks"), std::string::npos) << error;
-  }
   Form form;
   form.marks = true;
-  Writer flat(form);
-  write_sizes(flat, form, {4, 3});
-  for (int i = 0; i < 24; ++i) flat.real(i);
-  flat.end_record();
-  const std::string error = error_of([&] { read(folder, flat.bytes(), q_bytes(form)); });
-  EXPECT_NE(error.find("two-dimensional"), std::string::npos) << error;
-}
-
-/// Known values of the data set. Its gradient is computed by VTK's own filter, which is independent of this reader.
-TEST(Plot3dTest, BluntFin) {
-  const std::filesystem::path grid = data_file("bluntfin/bluntfinxyz.bin"), q = data_file("bluntfin/bluntfinq.bin");
-  SKIP_WITHOUT(grid);
-  const vtkSmartPointer<vtkStructuredGrid> mesh = vtkStructuredGrid::SafeDownCast(read_plot3d(grid, q).Get());
-  ASSERT_TRUE(mesh);
-  int size[3];
-  mesh->GetDimensions(size);
-  EXPECT_EQ(Eigen::Vector3i(size), Eigen::Vector3i(40, 32, 32));
-
-  vtkNew<vtkGradientFilter> filter;
-  filter->SetInputData(mesh);
-  filter->SetInputScalars(vtkDataObject::FIELD_ASSOCIATION_POINTS, "velocity");
-  filter->SetResultArrayName("gradient");
-  filter->Update();
-  vtkDataArray& gradient = *vtkDataSet::SafeDownCast(filter->GetOutput())->GetPointData()->GetArray("gradient");
-  std::vector<double> norms;
-  int complex = 0;
-  double asymmetry = 0;
-  for (vtkIdType i = 0; i < gradient.GetNumberOfTuples(); ++i) {
-    Eigen::Matrix3d t;
-    gradient.GetTuple(i, t.data());
-    norms.push_back(t.norm());
-    complex += t.eigenvalues().imag().cwiseAbs().maxCoeff() > 1e-9 * t.norm();
-    if (t.norm() > 0) asymmetry += (t - t.transpose()).norm() / t.norm();
+  Writer blocks(form);
+  blocks.integer(2);
+  blocks.end_record();
+  for (const int size : {2, 2, 2, 3, 2, 2}) blocks.integer(size);
+  blocks.end_record();
+  for (const int count : {8, 12}) {
+    for (int i = 0; i < 3 * count; ++i) blocks.real(i);
+    blocks.end_record();
   }
-  asymmetry /= static_cast<double>(norms.size());
-  EXPECT_EQ(std::count(norms.begin(), norms.end(), 0.0), 40);
-  const auto zeros = norms.begin() + 40, middle = zeros + (norms.end() - zeros) / 2;
-  std::nth_element(norms.begin(), middle, norms.end());
-  EXPECT_NEAR(norms[20480 + 20], 6.49, 0.005) << "the median of the nodes that have a gradient";
-  EXPECT_NEAR(*std::max_element(norms.begin(), norms.end()), 1942, 1);
-  EXPECT_NEAR(complex / 40960.0, 0.34, 0.01);
-  EXPECT_NEAR(asymmetry, 1.13, 0.01);
+  const std::string error = error_of([&] { read(folder, blocks.bytes(), q_bytes(form)); });
+  EXPECT_NE(error.find("2 blocks"), std::string::npos) << error;
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "tests/import/hdf5_writer.h"
 #include "tests/import/mesh_files.h"
+#include "tests/import/vtk_files.h"
 #include "tools/import/hdf5/hdf5_file.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
@@ -138,7 +139,7 @@ TEST(VtkHdf, NumbersThatWereNeverWrittenTakeNoMemory) {
 
 TEST(VtkHdf, DamageAndOtherKindsAreErrorsWithTheFile) {
   const TemporaryFolder folder;
-  const auto error = [&] { return error_of([&] { read_vtk_source(folder / "a.vtkhdf"); }); };
+  const auto error = [&] { return read_error(folder / "a.vtkhdf"); };
   write_grid(folder / "a.vtkhdf", false, 3);
   EXPECT_THAT(error(), HasSubstr("a.vtkhdf: is of version 3"));
   write_grid(folder / "a.vtkhdf", false);

@@ -118,7 +118,7 @@ TEST(Xdmf, NumbersInHdf5WithReferencesSlabsAndEntities) {
         <DataItem DataType="Float" Precision="8" Dimensions="2 5 3" Format="HDF">&HeavyData;:/fields/u</DataItem>
        </DataItem></Attribute>
       <Attribute Name="joined" Type="Vector" Center="Node">
-       <DataItem ItemType="Function" Dimensions="5 2" Function="JOIN($0, $1)">
+       <DataItem ItemType="Function" Dimensions="5 2" Function="JOIN($0 ; $1)">
         <DataItem ItemType="HyperSlab" Dimensions="5 1">
          <DataItem Dimensions="3 3" Format="XML">0 0 2  1 1 1  1 5 1</DataItem>
          <DataItem Dimensions="2 5 3" Format="HDF">&HeavyData;:/fields/u</DataItem></DataItem>
@@ -176,18 +176,6 @@ TEST(Xdmf, MixedCellsOrderedMeshesAndBinaryFiles) {
     <Geometry GeometryType="XY"><DataItem Dimensions="4 2" Format="XML">0 0 1 0 0 1 2 2</DataItem></Geometry></Grid>)"));
   ASSERT_TRUE(vtkStructuredGrid::SafeDownCast(structured));
   EXPECT_EQ(structured->GetPoint(3)[1], 2);
-}
-
-TEST(Xdmf, PiecesInSpaceAreMerged) {
-  const TemporaryFolder folder;
-  std::string other = mesh_items;
-  for (const auto& [from, to] : {std::pair<std::string, std::string>{"0 0 0  1 0 0", "0 0 0  -1 0 0"}})
-    other.replace(other.find(from), from.size(), to);
-  const auto mesh =
-      read(folder, document("<Grid GridType=\"Collection\" CollectionType=\"Spatial\"><Grid>" + mesh_items +
-                            attribute("f", 1) + "</Grid><Grid>" + other + attribute("f", 1) + "</Grid></Grid>"));
-  EXPECT_EQ(mesh->GetNumberOfCells(), 4);
-  EXPECT_EQ(mesh->GetNumberOfPoints(), 6);
 }
 
 TEST(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
@@ -251,21 +239,6 @@ TEST(Xdmf, PointsMayBeCountedFromOne) {
   }
   const std::string ordered = grid(with("Tetrahedron", "Order=\"3 2 1 0\"", "0 1 2 3  1 2 3 4"));
   EXPECT_THAT(error_of([&] { read(folder, ordered); }), HasSubstr("order of points of their own"));
-}
-
-TEST(Xdmf, JoinMayHaveSemicolons) {
-  const TemporaryFolder folder;
-  std::string items;
-  for (int i = 0; i < 3; ++i)
-    items += "<DataItem Dimensions=\"5\" Format=\"XML\">" + std::to_string(i) + " 0 0 0 0</DataItem>";
-  const auto mesh = read(folder, document("<Grid Name=\"a\">" + mesh_items +
-                                          "<Attribute Name=\"v\" Center=\"Node\"><DataItem ItemType=\"Function\" "
-                                          "Function=\"JOIN($0 ; $1 ; $2)\" Dimensions=\"5 3\">" +
-                                          items + "</DataItem></Attribute></Grid>"));
-  vtkDataArray* const v = mesh->GetPointData()->GetArray("v");
-  ASSERT_TRUE(v);
-  EXPECT_EQ(v->GetNumberOfComponents(), 3);
-  EXPECT_EQ(v->GetComponent(0, 2), 2);
 }
 
 /// Numbers whose products are beyond all integers, or that do not fit each other.

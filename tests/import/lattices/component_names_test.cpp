@@ -1,5 +1,7 @@
 // What formats say of components: their names and their order.
 
+#include <map>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <vtkCellData.h>
@@ -51,56 +53,44 @@ Matrix3d expected() {
   return tensor;
 }
 
-TEST(ComponentNames, UniformTensorsOfOpenFoamHaveItsOrder) {
-  const TemporaryFolder folder;
-  OpenFoamCase::write(folder);
-  const std::string head =
-      "FoamFile { version 2.0; format ascii; class CLASS; object NAME; } // xx xy xz yy yz zz\n"
-      "dimensions [0 0 0 0 0 0 0];\n";
-  const auto text = [&](const std::string& kind, const std::string& name, const std::string& rest) {
-    std::string all = head + rest;
-    all.replace(all.find("CLASS"), 5, kind);
-    return all.replace(all.find("NAME"), 4, name);
-  };
-  const std::string patches = "boundaryField { walls { type calculated; value uniform (9 9 9 9 9 9); } }\n";
-  write_bytes(folder / "0.5" / "plain", text("volSymmTensorField", "plain",
-                                             "/* internalField uniform (7 7 7 7 7 7); */\n"
-                                             "internalField   uniform (1 .2 .3 2 .4 3);\n" +
-                                                 patches));
-  std::string list = "internalField nonuniform List<symmTensor>\n8\n(\n";
-  for (int i = 0; i < 8; ++i) list += "(1 .2 .3 2 .4 3)\n";
-  write_bytes(folder / "0.5" / "list", text("volSymmTensorField", "list", list + ")\n;\n" + patches));
-  const std::string packed =
-      text("volSymmTensorField", "packed", "internalField uniform (1 .2 .3 2 .4 3);\n" + patches);
-  const gzFile file = gzopen((folder / "0.5" / "packed.gz").c_str(), "wb");
-  ASSERT_EQ(gzwrite(file, packed.data(), static_cast<unsigned>(packed.size())), static_cast<int>(packed.size()));
-  gzclose(file);
-  for (const char* name : {"plain", "list", "packed"})
-    EXPECT_LT((tensor_of_file(folder, name) - expected()).norm(), 1e-6) << name;
+/// Expects the tensor `expected`, unless another is given.
+void expect_tensor(const std::filesystem::path& file, const std::string& array, std::optional<TensorOrder> order = {},
+                   const Matrix3d& tensor = expected()) {
+  EXPECT_LT((tensor_of_file(file, array, order) - tensor).norm(), 1e-6) << file << array;
 }
 
 /// The value of a uniform field may be a macro, or in another file.
-TEST(ComponentNames, UniformTensorsOfOpenFoamMayBeElsewhere) {
+TEST(ComponentNames, UniformTensorsOfOpenFoamHaveItsOrder) {
   const TemporaryFolder folder;
   OpenFoamCase::write(folder);
-  const auto write = [&](const std::string& name, const std::string& values) {
-    write_bytes(folder / "0.5" / name,
-                "FoamFile { version 2.0; format ascii; class volSymmTensorField; object " + name +
-                    "; }\ndimensions [0 0 0 0 0 0 0];\n" + values +
-                    "\nboundaryField { walls { type calculated; value uniform (9 9 9 9 9 9); } }\n");
+  const auto text = [](const std::string& name, const std::string& values) {
+    return "FoamFile { version 2.0; format ascii; class volSymmTensorField; object " + name +
+           "; } // xx xy xz yy yz zz\ndimensions [0 0 0 0 0 0 0];\n/* internalField uniform (7 7 7 7 7 7); */\n" +
+           values + "\nboundaryField { walls { type calculated; value uniform (9 9 9 9 9 9); } }\n";
   };
-  std::string list = "nonuniform List<symmTensor> 8(";
-  for (int i = 0; i < 8; ++i) list += "(" + std::to_string(i) + " .2 .3 2 .4 3) ";
-  write("macro", "inner uniform (1 .2 .3 2 .4 3);\ninternalField $inner;");
-  write("list", "inner " + list + ");\ninternalField $inner;");
-  write("included", "#include \"values\"");
-  write("included_list", "#include \"list_of_values\"");
-  write_bytes(folder / "0.5" / "list_of_values", "internalField " + list + ");\n");
-  write_bytes(folder / "0.5" / "values", "internalField uniform (1 .2 .3 2 .4 3);\n");
-  for (const char* name : {"macro", "included"})
-    EXPECT_LT((tensor_of_file(folder, name) - expected()).norm(), 1e-6) << name;
+  const std::filesystem::path time = folder / "0.5";
+  const std::string uniform = "uniform (1 .2 .3 2 .4 3);\n";
+  std::string same = "nonuniform List<symmTensor>\n8\n(\n", list = "nonuniform List<symmTensor> 8(";
+  for (int i = 0; i < 8; ++i) {
+    same += "(1 .2 .3 2 .4 3)\n";
+    list += "(" + std::to_string(i) + " .2 .3 2 .4 3) ";
+  }
+  const std::map<std::string, std::string> fields{{"plain", "internalField   " + uniform},
+                                                  {"list", "internalField " + same + ")\n;\n"},
+                                                  {"macro", "inner " + uniform + "internalField $inner;"},
+                                                  {"included", "#include \"values\""},
+                                                  {"macro_list", "inner " + list + ");\ninternalField $inner;"},
+                                                  {"included_list", "#include \"list_of_values\""}};
+  for (const auto& [name, values] : fields) write_bytes(time / name, text(name, values));
+  write_bytes(time / "values", "internalField " + uniform);
+  write_bytes(time / "list_of_values", "internalField " + list + ");\n");
+  const std::string packed = text("packed", "internalField " + uniform);
+  const gzFile file = gzopen((time / "packed.gz").c_str(), "wb");
+  ASSERT_EQ(gzwrite(file, packed.data(), static_cast<unsigned>(packed.size())), static_cast<int>(packed.size()));
+  gzclose(file);
+  for (const char* name : {"plain", "list", "packed", "macro", "included"}) expect_tensor(folder, name);
   const auto read = read_vtk_source(folder);
-  for (const char* name : {"list", "included_list"}) {
+  for (const char* name : {"macro_list", "included_list"}) {
     vtkDataArray* const varied = read->GetCellData()->GetArray(name);
     ASSERT_TRUE(varied);
     EXPECT_EQ(varied->GetComponent(5, 0), 5) << name;
@@ -134,36 +124,25 @@ void write_exodus(const std::filesystem::path& path, const std::vector<std::stri
 
 TEST(ComponentNames, VariablesOfExodusKeepTheirNames) {
   const TemporaryFolder folder;
-  const std::filesystem::path six = folder / "six.e", nine = folder / "nine.e", order = folder / "order.e";
+  const std::filesystem::path six = folder / "six.e", nine = folder / "nine.e";
   write_exodus(six, {"stress_xx", "stress_xy", "stress_xz", "stress_yy", "stress_yz", "stress_zz"},
                {1, 0.2, 0.3, 2, 0.4, 3});
-  EXPECT_LT((tensor_of_file(six, "stress_xx,stress_yy,stress_zz,stress_xy,stress_yz,stress_xz") - expected()).norm(),
-            1e-6);
-  EXPECT_LT((tensor_of_file(six, "stress_xx,stress_xy,stress_xz,stress_yy,stress_yz,stress_zz") - expected()).norm(),
-            1e-6);
+  expect_tensor(six, "stress_xx,stress_yy,stress_zz,stress_xy,stress_yz,stress_xz");
+  expect_tensor(six, "stress_xx,stress_xy,stress_xz,stress_yy,stress_yz,stress_zz");
   write_exodus(nine,
                {"stress_xx", "stress_xy", "stress_xz", "stress_yx", "stress_yy", "stress_yz", "stress_zx", "stress_zy",
                 "stress_zz"},
                {1, 2, 3, 4, 5, 6, 7, 8, 9});
-  Matrix3d rows;
-  rows << 1, 2, 3, 4, 5, 6, 7, 8, 9;
-  EXPECT_LT((tensor_of_file(nine, "stress_x, stress_y, stress_z") - rows).norm(), 1e-6);
-  EXPECT_LT((tensor_of_file(
-                 nine, "stress_xx,stress_xy,stress_xz,stress_yx,stress_yy,stress_yz,stress_zx,stress_zy,stress_zz") -
-             rows)
-                .norm(),
-            1e-6);
-  EXPECT_LT(
-      (tensor_of_file(nine, "stress_x:0,stress_y:1,stress_z:2,stress_x:1,stress_y:2,stress_x:2", TensorOrder::vtk) -
-       (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished())
-          .norm(),
-      1e-6);
-  EXPECT_LT((tensor_of_file(nine,
-                            "stress_x:stress_xx,stress_y:stress_yy,stress_z:stress_zz,stress_x:stress_xy,stress_y:"
-                            "stress_yz,stress_x:stress_xz") -
-             (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished())
-                .norm(),
-            1e-6);
+  const Matrix3d rows = (Matrix3d() << 1, 2, 3, 4, 5, 6, 7, 8, 9).finished(),
+                 upper = (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished();
+  expect_tensor(nine, "stress_x, stress_y, stress_z", {}, rows);
+  expect_tensor(nine, "stress_xx,stress_xy,stress_xz,stress_yx,stress_yy,stress_yz,stress_zx,stress_zy,stress_zz", {},
+                rows);
+  expect_tensor(nine, "stress_x:0,stress_y:1,stress_z:2,stress_x:1,stress_y:2,stress_x:2", TensorOrder::vtk, upper);
+  expect_tensor(nine,
+                "stress_x:stress_xx,stress_y:stress_yy,stress_z:stress_zz,stress_x:stress_xy,stress_y:stress_yz,"
+                "stress_x:stress_xz",
+                {}, upper);
   refuses(nine, "stress_x:3,stress_y,stress_z", {}, "no array \"stress_x:3\"");
 }
 
@@ -181,8 +160,8 @@ TEST(ComponentNames, AllKindsOfFilesObeyThem) {
     const std::filesystem::path file = folder / ("a" + ending);
     add_voigt(*set, true);
     write_xml(*set, file);
-    EXPECT_LT((tensor_of_file(file, "S") - expected()).norm(), 1e-6) << ending;
-    EXPECT_LT((tensor_of_file(file, "S", TensorOrder::voigt) - expected()).norm(), 1e-6) << ending;
+    expect_tensor(file, "S");
+    expect_tensor(file, "S", TensorOrder::voigt);
     refuses(file, "S", TensorOrder::vtk, "leave --order out");
     add_voigt(*set, false);
     write_xml(*set, file);
@@ -193,112 +172,82 @@ TEST(ComponentNames, AllKindsOfFilesObeyThem) {
 
 TEST(ComponentNames, SymmetricTensorsOfVtkHaveItsOrder) {
   const TemporaryFolder folder;
-  for (const auto& [ending, set] : data_sets()) {
-    for (const char* name : {"first S", "second"})
-      add_array<6>(*set, name, [](const Vector3d&) {
-        return (Eigen::Matrix<double, 6, 1>() << 1, 2, 3, 0.2, 0.4, 0.3).finished();
-      });
-    set->GetPointData()->SetActiveTensors("second");
-    write_xml(*set, folder / ("a" + ending));
-    EXPECT_LT((tensor_of_file(folder / ("a" + ending), "second") - expected()).norm(), 1e-6) << ending;
-    for (const bool binary : {false, true}) {
-      write_legacy(*set, folder / "a.vtk", binary);
-      EXPECT_NE(bytes_of(folder / "a.vtk").find("TENSORS6 second"), std::string::npos);
-      EXPECT_LT((tensor_of_file(folder / "a.vtk", "second") - expected()).norm(), 1e-6) << ending;
-      EXPECT_THROW(tensor_of_file(folder / "a.vtk", "second", TensorOrder::fsl), std::invalid_argument);
-      EXPECT_THROW(tensor_of_file(folder / "a.vtk", "first S"), std::invalid_argument);  // It is a field's array.
-    }
+  const auto set = bar(0, 3);
+  for (const char* name : {"first S", "second"})
+    add_array<6>(*set, name,
+                 [](const Vector3d&) { return (Eigen::Matrix<double, 6, 1>() << 1, 2, 3, 0.2, 0.4, 0.3).finished(); });
+  set->GetPointData()->SetActiveTensors("second");
+  write_xml(*set, folder / "a.vtu");
+  expect_tensor(folder / "a.vtu", "second");
+  for (const bool binary : {false, true}) {
+    write_legacy(*set, folder / "a.vtk", binary);
+    EXPECT_NE(bytes_of(folder / "a.vtk").find("TENSORS6 second"), std::string::npos);
+    expect_tensor(folder / "a.vtk", "second");
+    EXPECT_THROW(tensor_of_file(folder / "a.vtk", "second", TensorOrder::fsl), std::invalid_argument);
+    EXPECT_THROW(tensor_of_file(folder / "a.vtk", "first S"), std::invalid_argument);  // It is a field's array.
   }
 }
 
+/// A title may be any words, also a keyword.
 TEST(ComponentNames, OfTwoTensors6BothTellTheirOrder) {
   const TemporaryFolder folder;
-  std::string text =
-      "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n"
-      "SPACING 1 1 1\nPOINT_DATA 8\n";
-  for (const char* name : {"a", "b%20b"}) {
-    text += std::string("TENSORS6 ") + name + " float\n";
-    for (int i = 0; i < 8; ++i) text += "1 2 3 .2 .4 .3\n";
+  for (const std::string keyword : {"TENSORS6 ", "tensors6 "}) {
+    std::string text =
+        "# vtk DataFile Version 3.0\nTENSORS6 field\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 "
+        "0\nSPACING 1 1 1\nPOINT_DATA 8\n";
+    std::string numbers;
+    for (int i = 0; i < 8; ++i) numbers += "1 2 3 .2 .4 .3\n";
+    for (const std::string name : {"a", "b%20b"}) text += keyword + name + " float\n" + numbers;
+    write_bytes(folder / "a.vtk", text + "FIELD FieldData 1\nfield 6 8 float\n" + numbers);
+    for (const char* name : {"a", "b b"}) expect_tensor(folder / "a.vtk", name);
+    refuses(folder / "a.vtk", "field", {}, "give it with --order");
   }
-  write_bytes(folder / "a.vtk", text);
-  for (const char* name : {"a", "b b"})
-    EXPECT_LT((tensor_of_file(folder / "a.vtk", name) - expected()).norm(), 1e-6) << name;
 }
 
 TEST(ComponentNames, ThreeScalarsAreAVector) {
   const TemporaryFolder folder;
-  Matrix3d gradient;
-  gradient << 1, 2, 3, -4, 5, 6, 7, -8, 10;
-  for (const auto& [ending, set] : data_sets()) {
-    const char* const names[] = {"X Velocity", "Y Velocity", "Z Velocity"};
-    for (int i = 0; i < 3; ++i)
-      add_array<1>(*set, names[i],
-                   [&](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(gradient.row(i).dot(p)); });
-    write_xml(*set, folder / ("a" + ending));
-    const std::string list = "X Velocity,Y Velocity,Z Velocity";
-    EXPECT_LT((tensor_of_file(folder / ("a" + ending), list, {}, Take::gradient) - gradient).norm(), 1e-4) << ending;
-    EXPECT_LT(
-        (tensor_of_file(folder / ("a" + ending), list, {}, Take::strain) - 0.5 * (gradient + gradient.transpose()))
-            .norm(),
-        1e-4)
-        << ending;
-    refuses(folder / ("a" + ending), "X Velocity,Y Velocity", {}, "--gradient-of lists 2 arrays, and a vector has 3",
-            Take::gradient);
-  }
+  const Matrix3d gradient = (Matrix3d() << 1, 2, 3, -4, 5, 6, 7, -8, 10).finished();
+  const auto set = bar(0, 3);
+  const std::string list = "X Velocity,Y Velocity,Z Velocity";
+  for (int i = 0; i < 3; ++i)
+    add_array<1>(*set, std::string(1, "XYZ"[i]) + " Velocity",
+                 [&](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(gradient.row(i).dot(p)); });
+  write_xml(*set, folder / "a.vtu");
+  EXPECT_LT((tensor_of_file(folder / "a.vtu", list, {}, Take::gradient) - gradient).norm(), 1e-4);
+  EXPECT_LT((tensor_of_file(folder / "a.vtu", list, {}, Take::strain) - 0.5 * (gradient + gradient.transpose())).norm(),
+            1e-4);
+  refuses(folder / "a.vtu", "X Velocity,Y Velocity", {}, "--gradient-of lists 2 arrays, and a vector has 3",
+          Take::gradient);
 }
 
 /// The entries of a tensor that names tell, in orders that no program is known to use.
 TEST(ComponentNames, TellAnyOrder) {
   const TemporaryFolder folder;
-  Matrix3d rows;
-  rows << 1, 2, 3, 4, 5, 6, 7, 8, 9;
+  const Matrix3d rows = (Matrix3d() << 1, 2, 3, 4, 5, 6, 7, 8, 9).finished();
   const std::vector<std::string> six{"ZZ", "xy", "s_11", "YZ", "S22", "zx"};
   const std::vector<std::string> nine{"xx", "yy", "zz", "xy", "yz", "xz", "yx", "zy", "zx"};
-  for (const auto& [ending, set] : data_sets()) {
-    add_array<6>(*set, "six",
-                 [](const Vector3d&) { return (Eigen::Matrix<double, 6, 1>() << 3, 0.2, 1, 0.4, 2, 0.3).finished(); });
-    add_array<9>(*set, "nine", [](const Vector3d&) {
-      return (Eigen::Matrix<double, 9, 1>() << 1, 5, 9, 2, 6, 3, 4, 8, 7).finished();
-    });
-    std::string list;
-    for (int i = 0; i < 9; ++i) {
-      const std::string& name = nine[static_cast<std::size_t>(i)];
-      if (i < 6) set->GetPointData()->GetArray("six")->SetComponentName(i, six[static_cast<std::size_t>(i)].c_str());
-      set->GetPointData()->GetArray("nine")->SetComponentName(i, name.c_str());
-      add_array<1>(*set, "s" + name,
-                   [&](const Vector3d&) { return Eigen::Matrix<double, 1, 1>(rows(name[0] - 'x', name[1] - 'x')); });
-      list += (i == 0 ? "s" : ",s") + name;
-    }
-    const std::filesystem::path file = folder / ("a" + ending);
-    write_xml(*set, file);
-    EXPECT_LT((tensor_of_file(file, "six") - expected()).norm(), 1e-6) << ending;
-    refuses(file, "six", TensorOrder::fsl, "leave --order out");
-    EXPECT_LT((tensor_of_file(file, "nine") - rows).norm(), 1e-6) << ending;
-    EXPECT_LT((tensor_of_file(file, list) - rows).norm(), 1e-6) << ending;
-    EXPECT_LT(
-        (tensor_of_file(file, "szz,syz,syy,sxz,sxy,sxx") - (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished()).norm(),
-        1e-6)
-        << ending;
-    refuses(file, "szz,syz,syy,sxz,sxy,sxx", TensorOrder::fsl, "leave --order out");
+  const auto set = bar(0, 3);
+  add_array<6>(*set, "six",
+               [](const Vector3d&) { return (Eigen::Matrix<double, 6, 1>() << 3, 0.2, 1, 0.4, 2, 0.3).finished(); });
+  add_array<9>(*set, "nine",
+               [](const Vector3d&) { return (Eigen::Matrix<double, 9, 1>() << 1, 5, 9, 2, 6, 3, 4, 8, 7).finished(); });
+  std::string list;
+  for (int i = 0; i < 9; ++i) {
+    const std::string& name = nine[static_cast<std::size_t>(i)];
+    if (i < 6) set->GetPointData()->GetArray("six")->SetComponentName(i, six[static_cast<std::size_t>(i)].c_str());
+    set->GetPointData()->GetArray("nine")->SetComponentName(i, name.c_str());
+    add_array<1>(*set, "s" + name,
+                 [&](const Vector3d&) { return Eigen::Matrix<double, 1, 1>(rows(name[0] - 'x', name[1] - 'x')); });
+    list += (i == 0 ? "s" : ",s") + name;
   }
-}
-
-TEST(ComponentNames, KeywordsOfLegacyFilesMayBeInSmallLetters) {
-  const TemporaryFolder folder;
-  std::string text =
-      "# vtk DataFile Version 3.0\nTENSORS6 field\nASCII\ndataset STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n"
-      "SPACING 1 1 1\npoint_data 8\n";
-  for (const char* name : {"a", "b"}) {
-    text += std::string("tensors6 ") + name + " float\n";
-    for (int i = 0; i < 8; ++i) text += "1 2 3 .2 .4 .3\n";
-  }
-  text += "FIELD FieldData 1\nfield 6 8 float\n";
-  for (int i = 0; i < 8; ++i) text += "1 2 3 .2 .4 .3\n";
-  text.replace(text.find("dataset"), 7, "DATASET");
-  write_bytes(folder / "a.vtk", text);
-  for (const char* name : {"a", "b"})
-    EXPECT_LT((tensor_of_file(folder / "a.vtk", name) - expected()).norm(), 1e-6) << name;
-  refuses(folder / "a.vtk", "field", {}, "give it with --order");  // The title is not a keyword.
+  const std::filesystem::path file = folder / "a.vtu";
+  write_xml(*set, file);
+  expect_tensor(file, "six");
+  refuses(file, "six", TensorOrder::fsl, "leave --order out");
+  expect_tensor(file, "nine", {}, rows);
+  expect_tensor(file, list, {}, rows);
+  expect_tensor(file, "szz,syz,syy,sxz,sxy,sxx", {}, (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished());
+  refuses(file, "szz,syz,syy,sxz,sxy,sxx", TensorOrder::fsl, "leave --order out");
 }
 
 }  // namespace

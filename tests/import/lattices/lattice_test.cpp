@@ -78,14 +78,6 @@ TEST(Lattice, BlocksAreOrderedAndOnlyThoseWithActiveVoxels) {
   });
 }
 
-TEST(Lattice, TheFrameTurnsTensorsOnce) {
-  const Matrix3d frame = test::rotation(), tensor = test::general_tensor();
-  Lattice lattice = lattice_of({2, 1, 1}, [&](const Vector3i&) { return full(tensor); });
-  lattice.frame = frame;
-  const TensorGrid grid = test::tensors_of(lattice);
-  test::expect_near(frame * tensor * frame.transpose(), test::voxel(grid, {1, 0, 0}));
-}
-
 TEST(Lattice, TheFrameForFslIsThatOfItsOrderAlone) {
   const Matrix3d turn = test::rotation();
   const auto lattice = [&] {
@@ -134,29 +126,11 @@ TEST(Lattice, MaskedZeroAndNonFiniteVoxelsAreInactive) {
   EXPECT_EQ(grid.blocks.front().values[TensorBlock::offset(1, 0, 0)], Eigen::Matrix3f::Zero());
 }
 
-TEST(Lattice, ZeroIsATensorWhereTheFormatDoesNotSayOtherwise) {
-  const Lattice lattice = lattice_of({3, 3, 3}, [](const Vector3i&) { return full(Matrix3d::Zero()); });
-  EXPECT_EQ(test::tensors_of(lattice).active_voxels(), 27u);
-}
-
-TEST(Lattice, NothingActiveIsAnEmptyGrid) {
-  const Lattice lattice = lattice_of({3, 3, 3}, [](const Vector3i&) { return full(Matrix3d::Constant(NAN)); });
-  EXPECT_TRUE(test::tensors_of(lattice).blocks.empty());
-}
-
 TEST(Lattice, OfMoreThanNineComponentsTheFirstSixAreTheTensor) {
   const Lattice lattice = lattice_of(
       {1, 1, 1}, [](const Vector3i&) { return std::vector<double>{11, 22, 33, 12, 23, 13, 99, NAN, 99, 99}; });
   const TensorGrid grid = test::tensors_of(lattice, "vtk");
   test::expect_near((Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished(), test::voxel(grid, {0, 0, 0}));
-}
-
-TEST(Lattice, TheLatticesOwnOrderIsTakenAndNotContradicted) {
-  Lattice lattice = lattice_of({1, 1, 1}, [](const Vector3i&) { return std::vector<double>{11, 12, 22, 13, 23, 33}; });
-  lattice.order = TensorOrder::lower_triangle;
-  const TensorGrid grid = test::tensors_of(lattice);
-  test::expect_near((Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished(), test::voxel(grid, {0, 0, 0}));
-  test::expect_error([&] { test::tensors_of(lattice, "vtk"); }, {"--order"});
 }
 
 TEST(Lattice, WrongNumbersOfComponentsAndAMissingOrderAreErrors) {
@@ -212,12 +186,6 @@ TEST(Lattice, GradientLeavesOutInactiveVoxels) {
   Matrix3d expected = Matrix3d::Zero();
   expected(0, 0) = 2;
   test::expect_near(expected, test::voxel(grid, {3, 4, 4}));
-}
-
-TEST(Lattice, WhatTheReaderThrowsComesThrough) {
-  Lattice lattice = lattice_of({1, 1, 1}, [](const Vector3i&) { return full(Matrix3d::Ones()); });
-  lattice.read_slice = [](int, double*) { throw std::runtime_error("\"a.npy\": cannot be read to its end"); };
-  test::expect_error([&] { test::tensors_of(lattice); }, {"a.npy"});
 }
 
 }  // namespace

@@ -65,9 +65,21 @@ Matrix3d plane_tensor(const Vector3d& p) {
   return (Matrix3d() << c[0], c[3], 0, c[3], c[1], 0, 0, 0, c[2]).finished();
 }
 
-TensorGrid import(const std::filesystem::path& file, ImportSettings settings, ImportReport& report) {
+TensorGrid import(const std::filesystem::path& file, ImportSettings settings = {}, double* thickness = nullptr) {
   settings.files = {file};
-  return import_tensors(settings, Progress(), report);
+  ImportReport report;
+  TensorGrid grid = import_tensors(settings, Progress(), report);
+  if (thickness) *thickness = report.thickness;
+  return grid;
+}
+
+/// Expects an error of the user's with these words.
+void refuses(const std::filesystem::path& file, const ImportSettings& settings, const std::string& words) {
+  EXPECT_THAT([&] { import(file, settings); }, ThrowsMessage<std::invalid_argument>(HasSubstr(words)));
+}
+
+void expect_everywhere(const TensorGrid& grid, const std::function<Matrix3d(const Vector3d&)>& tensor) {
+  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& value) { EXPECT_LT((value - tensor(p)).norm(), 1e-5); });
 }
 
 ImportSettings settings_of_plane(const char* array, double thickness) {
@@ -88,9 +100,9 @@ TEST(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
       write_xml(*mesh, folder / "a.vtu");
       ImportSettings settings = settings_of_plane("stress", 0.75);
       settings.sampling.resolution = 0.25;
-      ImportReport report;
-      const TensorGrid grid = import(folder / "a.vtu", settings, report);
-      EXPECT_EQ(report.thickness, 0.75);
+      double thickness = 0;
+      const TensorGrid grid = import(folder / "a.vtu", settings, &thickness);
+      EXPECT_EQ(thickness, 0.75);
       EXPECT_EQ(grid.active_voxels(), 17u * 17);
       const Eigen::AlignedBox3i box = grid.active_box();
       EXPECT_EQ(box.min()[axis], box.max()[axis]);
@@ -107,9 +119,9 @@ TEST(FlatMesh, DefaultsAreATypicalEdge) {
   const Grid mesh = square(VTK_QUAD);
   add_array<9>(*mesh, "T", [](const Vector3d& p) { return flat(plane_tensor(p)); });
   write_xml(*mesh, folder / "a.vtu");
-  ImportReport report;
-  const TensorGrid grid = import(folder / "a.vtu", {}, report);
-  EXPECT_NEAR(report.thickness, 0.5, 1e-12);
+  double thickness = 0;
+  const TensorGrid grid = import(folder / "a.vtu", {}, &thickness);
+  EXPECT_NEAR(thickness, 0.5, 1e-12);
   EXPECT_EQ(grid.active_voxels(), 81u);
   EXPECT_NEAR(grid.to_world.linear()(0, 0), 0.5, 1e-12);
 }
@@ -122,10 +134,8 @@ TEST(FlatMesh, GradientsOfVectorsOfTwoComponents) {
   ImportSettings settings;
   settings.array = "u";
   settings.take = Take::gradient;
-  ImportReport report;
   const Matrix3d expected = (Matrix3d() << 2, 3, 0, 5, -1, 0, 0, 0, 0).finished();
-  for_each_voxel(import(folder / "a.vtu", settings, report),
-                 [&](const Vector3d&, const Matrix3d& tensor) { EXPECT_LT((tensor - expected).norm(), 1e-5); });
+  expect_everywhere(import(folder / "a.vtu", settings), [&](const Vector3d&) { return expected; });
 }
 
 TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
@@ -134,16 +144,13 @@ TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
   add_array<4>(*mesh, "S", plane);
   write_xml(*mesh, folder / "a.vtu");
   ImportSettings settings;
-  ImportReport report;
-  EXPECT_THAT([&] { import(folder / "a.vtu", settings, report); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("no array suits")));  // Four may be colours.
+  refuses(folder / "a.vtu", settings, "no array suits");  // Four may be colours.
   settings.array = "S";
-  EXPECT_THAT([&] { import(folder / "a.vtu", settings, report); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("plane (xx yy zz xy) or 2x2")));
+  refuses(folder / "a.vtu", settings, "plane (xx yy zz xy) or 2x2");
   settings.order = TensorOrder::vtk;
-  EXPECT_THROW(import(folder / "a.vtu", settings, report), std::invalid_argument);
+  EXPECT_THROW(import(folder / "a.vtu", settings), std::invalid_argument);
   settings.order = TensorOrder::two_by_two;
-  for_each_voxel(import(folder / "a.vtu", settings, report), [&](const Vector3d& p, const Matrix3d& tensor) {
+  for_each_voxel(import(folder / "a.vtu", settings), [&](const Vector3d& p, const Matrix3d& tensor) {
     const Eigen::Vector4d c = plane(p);
     EXPECT_LT((tensor - (Matrix3d() << c[0], c[1], 0, c[2], c[3], 0, 0, 0, 0).finished()).norm(), 1e-5);
   });
@@ -151,9 +158,7 @@ TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
   for (int i = 0; i < 4; ++i) mesh->GetPointData()->GetArray("S")->SetComponentName(i, names[i]);
   write_xml(*mesh, folder / "b.vtu");
   settings.order.reset();
-  for_each_voxel(import(folder / "b.vtu", settings, report), [&](const Vector3d& p, const Matrix3d& tensor) {
-    EXPECT_LT((tensor - plane_tensor(p)).norm(), 1e-5);
-  });
+  expect_everywhere(import(folder / "b.vtu", settings), plane_tensor);
 }
 
 TEST(FlatMesh, ScalarArraysOfAPlaneAreJoined) {
@@ -166,8 +171,7 @@ TEST(FlatMesh, ScalarArraysOfAPlaneAreJoined) {
   for (const bool with_zz : {false, true}) {
     ImportSettings settings;
     settings.array = with_zz ? "sxy,szz,sxx,syy" : "sxx,syy,sxy";
-    ImportReport report;
-    for_each_voxel(import(folder / "a.vtu", settings, report), [&](const Vector3d& p, const Matrix3d& tensor) {
+    for_each_voxel(import(folder / "a.vtu", settings), [&](const Vector3d& p, const Matrix3d& tensor) {
       Matrix3d expected = plane_tensor(p);
       if (!with_zz) expected(2, 2) = 0;
       EXPECT_LT((tensor - expected).norm(), 1e-5);
@@ -175,9 +179,7 @@ TEST(FlatMesh, ScalarArraysOfAPlaneAreJoined) {
   }
   ImportSettings settings;
   settings.array = "sxx,syy,szz";
-  ImportReport report;
-  EXPECT_THAT([&] { import(folder / "a.vtu", settings, report); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("xx, yy, xy")));
+  refuses(folder / "a.vtu", settings, "xx, yy, xy");
 }
 
 TEST(FlatMesh, FlatImagesAndRectilinearGrids) {
@@ -187,12 +189,10 @@ TEST(FlatMesh, FlatImagesAndRectilinearGrids) {
   add_array<4>(*image, "S", plane);
   write_xml(*image, folder / "a.vti");
   ImportSettings settings = settings_of_plane("S", 3);
-  ImportReport report;
-  const TensorGrid voxels = import(folder / "a.vti", settings, report);
+  const TensorGrid voxels = import(folder / "a.vti", settings);
   EXPECT_EQ(voxels.active_voxels(), 20u);
   EXPECT_EQ(voxels.to_world.linear()(2, 2), 3);
-  for_each_voxel(
-      voxels, [&](const Vector3d& p, const Matrix3d& tensor) { EXPECT_LT((tensor - plane_tensor(p)).norm(), 1e-5); });
+  expect_everywhere(voxels, plane_tensor);
 
   vtkNew<vtkRectilinearGrid> rectilinear;
   vtkNew<vtkDoubleArray> x, y, z;
@@ -205,7 +205,7 @@ TEST(FlatMesh, FlatImagesAndRectilinearGrids) {
   add_array<4>(*rectilinear, "S", plane);
   write_xml(*rectilinear, folder / "a.vtr");
   settings.sampling.resolution = 0.5;
-  const TensorGrid sampled = import(folder / "a.vtr", settings, report);
+  const TensorGrid sampled = import(folder / "a.vtr", settings);
   EXPECT_EQ(sampled.active_voxels(), 81u);
 }
 
@@ -219,8 +219,7 @@ TEST(FlatMesh, ValuesOfCells) {
   for (int c = 0; c < 9; ++c) values->FillComponent(c, c);
   mesh->GetCellData()->AddArray(values);
   write_xml(*mesh, folder / "a.vtu");
-  ImportReport report;
-  const TensorGrid grid = import(folder / "a.vtu", {}, report);
+  const TensorGrid grid = import(folder / "a.vtu");
   EXPECT_GT(grid.active_voxels(), 50u);
   for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& tensor) { EXPECT_EQ(tensor(1, 2), 5); });
 }
@@ -228,7 +227,6 @@ TEST(FlatMesh, ValuesOfCells) {
 TEST(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
   const TemporaryFolder folder;
   ImportSettings settings;
-  ImportReport report;
   const Grid bent_square = square(VTK_QUAD);
   for (vtkIdType i = 0; i < bent_square->GetNumberOfPoints(); ++i) {
     Vector3d p(bent_square->GetPoint(i));
@@ -238,15 +236,13 @@ TEST(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
   add_array<9>(*bent_square, "T", [](const Vector3d& p) { return flat(linear_tensor(p)); });
   write_xml(*bent_square, folder / "bent.vtu");
   EXPECT_THAT(
-      [&] { import(folder / "bent.vtu", settings, report); },
+      [&] { import(folder / "bent.vtu", settings); },
       ThrowsMessage<std::invalid_argument>(testing::AllOf(HasSubstr("bent.vtu"), HasSubstr("surface in space"))));
   settings.thickness = 1;
   write_xml(*bar(0, 3), folder / "solid.vtu");
-  EXPECT_THAT([&] { import(folder / "solid.vtu", settings, report); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("--thickness")));
+  refuses(folder / "solid.vtu", settings, "--thickness");
   write_xml(*image(), folder / "solid.vti");
-  EXPECT_THAT([&] { import(folder / "solid.vti", settings, report); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("--thickness")));
+  refuses(folder / "solid.vti", settings, "--thickness");
 }
 
 /// Images keep their voxels, and are fields of a plane as meshes are.
@@ -266,10 +262,9 @@ TEST(FlatMesh, VectorsOfImagesMayHaveTwoComponents) {
       settings.array = array;
       settings.take = Take::gradient;
       if (sampled) settings.sampling.resolution = 0.5;
-      ImportReport report;
-      const TensorGrid grid = import(folder / "a.vti", settings, report);
+      const TensorGrid grid = import(folder / "a.vti", settings);
       EXPECT_EQ(grid.active_voxels(), sampled ? 9u * 7 : 5u * 4);
-      for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& t) { EXPECT_LT((t - expected).norm(), 1e-5); });
+      expect_everywhere(grid, [&](const Vector3d&) { return expected; });
     }
 }
 
@@ -279,14 +274,13 @@ TEST(FlatMesh, TheThicknessIsNoEdgeThatIsDivided) {
   add_array<4>(*mesh, "stress", plane);
   write_xml(*mesh, folder / "a.vtu");
   ImportSettings settings = settings_of_plane("stress", 100);
-  ImportReport report;
   for (const auto& resolution : {decltype(settings.sampling.resolution)(17), {Vector3i(17, 17, 1)}}) {
     settings.sampling.resolution = resolution;
-    EXPECT_EQ(import(folder / "a.vtu", settings, report).active_voxels(), 17u * 17);
+    EXPECT_EQ(import(folder / "a.vtu", settings).active_voxels(), 17u * 17);
   }
   settings.sampling.resolution = {};
   settings.sampling.bounds = Eigen::AlignedBox3d(Vector3d(1, 1, 0), Vector3d(1.25, 1.25, 0));  // Half of an edge.
-  EXPECT_EQ(import(folder / "a.vtu", settings, report).active_voxels(), 4u);
+  EXPECT_EQ(import(folder / "a.vtu", settings).active_voxels(), 4u);
 }
 
 }  // namespace

@@ -102,15 +102,6 @@ TEST(MeshBoundary, HiddenCellsBelongToTheBody) {
   EXPECT_NEAR(signed_volume(read_mesh(path)), 0.008, 1e-12);
 }
 
-TEST(MeshBoundary, IsBinaryPolygonsInLittleEndian) {
-  const auto path = file_name("header");
-  write_boundary(*shell(1), path);
-  std::ifstream file(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  EXPECT_EQ(bytes.rfind("ply\nformat binary_little_endian 1.0\nelement vertex 8\n", 0), 0u);
-  EXPECT_EQ(bytes.size(), bytes.find("end_header\n") + 11 + 8 * 24 + 12 * 13);
-}
-
 TEST(MeshBoundary, RefusesFlatMeshesAndFoldersThatAreMissing) {
   const auto flat_mesh = curvilinear({3, 3, 1}, [](const Vector3d& p) { return Vector3d(p.x(), p.y(), 0); });
   EXPECT_THROW(write_boundary(*flat_mesh, file_name("flat")), std::invalid_argument);

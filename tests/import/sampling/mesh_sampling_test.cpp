@@ -12,6 +12,7 @@
 #include "base/constants.h"
 #include "tests/import/mesh_fixtures.h"
 #include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/sampling/sampling_lattice.h"
 
 namespace tensorray {
 namespace {
@@ -50,43 +51,24 @@ void expect_linear(const TensorGrid& grid) {
   EXPECT_LT(worst, 5e-6);  // single precision of numbers up to 23, and a position error of at most 1e-6 of the diagonal
 }
 
-struct CellCase {
-  const char* name;
-  int type;
-  bool is_bent;
-};
-
-class EveryCell : public ::testing::TestWithParam<CellCase> {};
-
 // Spacings of 1/(n − 1), and cells of edge 1/3, put voxels on faces, edges and corners of the cells and of the cube.
-TEST_P(EveryCell, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
-  const auto mesh = unit_cube(GetParam().type, 3, GetParam().is_bent ? Map(bent) : identity);
-  add_linear_tensor(*mesh);
-  for (const int count : {13, 26}) {
-    SamplingReport report;
-    const TensorGrid grid = sampled(*mesh, resolution(count), report);
-    EXPECT_EQ(report.size, Vector3i::Constant(count));
-    EXPECT_EQ(report.active, static_cast<std::size_t>(count) * count * count);
-    EXPECT_EQ(grid.active_voxels(), report.active);
-    expect_linear(grid);
-  }
-}
-
 // The curved faces of a bent quadratic cell fit its neighbours, because its middle nodes are bent too.
-INSTANTIATE_TEST_SUITE_P(Types, EveryCell,
-                         ::testing::Values(CellCase{"Hexahedron", VTK_HEXAHEDRON, false},
-                                           CellCase{"BentHexahedron", VTK_HEXAHEDRON, true},
-                                           CellCase{"LagrangeHexahedron", VTK_LAGRANGE_HEXAHEDRON, false},
-                                           CellCase{"BentLagrangeHexahedron", VTK_LAGRANGE_HEXAHEDRON, true},
-                                           CellCase{"Wedge", VTK_WEDGE, false}, CellCase{"BentWedge", VTK_WEDGE, true},
-                                           CellCase{"Pyramid", VTK_PYRAMID, false},
-                                           CellCase{"Tetrahedron", VTK_TETRA, false},
-                                           CellCase{"BentTetrahedron", VTK_TETRA, true},
-                                           CellCase{"QuadraticTetrahedron", VTK_QUADRATIC_TETRA, false},
-                                           CellCase{"BentQuadraticTetrahedron", VTK_QUADRATIC_TETRA, true},
-                                           CellCase{"QuadraticHexahedron", VTK_QUADRATIC_HEXAHEDRON, false},
-                                           CellCase{"BentQuadraticHexahedron", VTK_QUADRATIC_HEXAHEDRON, true}),
-                         [](const auto& test) { return std::string(test.param.name); });
+TEST(MeshSampling, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
+  for (const int type : {VTK_HEXAHEDRON, VTK_LAGRANGE_HEXAHEDRON, VTK_WEDGE, VTK_PYRAMID, VTK_TETRA,
+                         VTK_QUADRATIC_TETRA, VTK_QUADRATIC_HEXAHEDRON})
+    for (const bool is_bent : {false, true}) {
+      if (is_bent && type == VTK_PYRAMID) continue;  // Its sides would be gaps.
+      SCOPED_TRACE(testing::Message() << type << is_bent);
+      const auto mesh = unit_cube(type, 3, is_bent ? Map(bent) : identity);
+      add_linear_tensor(*mesh);
+      SamplingReport report;
+      const TensorGrid grid = sampled(*mesh, resolution(13), report);
+      EXPECT_EQ(report.size, Vector3i::Constant(13));
+      EXPECT_EQ(report.active, 13u * 13 * 13);
+      EXPECT_EQ(grid.active_voxels(), report.active);
+      expect_linear(grid);
+    }
+}
 
 TEST(MeshSampling, QuadraticCellsGiveAQuadraticFieldExactly) {
   const auto mesh = unit_cube(VTK_QUADRATIC_TETRA, 2, identity);
@@ -97,14 +79,6 @@ TEST(MeshSampling, QuadraticCellsGiveAQuadraticFieldExactly) {
     worst = std::max(worst, (tensor - value(p)).cwiseAbs().maxCoeff());
   });
   EXPECT_LT(worst, 1e-5);
-}
-
-TEST(MeshSampling, CurvilinearGridsAreSampledLikeLooseHexahedra) {
-  const auto mesh = curvilinear({6, 9, 5}, bent);
-  add_linear_tensor(*mesh);
-  SamplingReport report;
-  expect_linear(sampled(*mesh, resolution(20), report));
-  EXPECT_EQ(report.active, 20u * 20u * 20u);
 }
 
 TEST(MeshSampling, HolesAndTheOutsideAreInactive) {
@@ -158,10 +132,9 @@ TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {
   const auto mesh = curvilinear(
       {202, 2, 2}, [](const Vector3d& p) { return Vector3d(p.x() < 0.999 ? p.x() * 1e-4 : 1.0, p.y(), p.z()); });
   add_linear_tensor(*mesh);
-  SamplingReport report;
-  sampled(*mesh, {}, report);
-  EXPECT_LE(report.size.cast<double>().prod(), 1 << 21);
-  EXPECT_GE(report.size.cast<double>().prod(), 0.9 * (1 << 21));
+  const double voxels = sampling_lattice(*mesh, solid_part(*mesh), {}).size.cast<double>().prod();
+  EXPECT_LE(voxels, 1 << 21);
+  EXPECT_GE(voxels, 0.9 * (1 << 21));
 }
 
 TEST(MeshSampling, BoundsCropTheLatticeAndTheReport) {
@@ -230,21 +203,6 @@ TEST(MeshSampling, OfCellsThatListMorePointsThanTheirTypeHasTheFirstCount) {
   expect_linear(sampled(*mesh, resolution(9), report));
   EXPECT_EQ(report.active, 9u * 9u * 9u);
   EXPECT_GT(report.native_median, 10);  // the zeros at middle nodes do not count
-}
-
-TEST(MeshSampling, HiddenCellsAreNotThere) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 2, identity);
-  add_linear_tensor(*mesh);
-  vtkNew<vtkUnsignedCharArray> ghosts;
-  ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
-  for (int i = 0; i < 8; ++i)
-    ghosts->InsertNextValue(i == 0   ? vtkDataSetAttributes::HIDDENCELL
-                            : i == 1 ? vtkDataSetAttributes::DUPLICATECELL
-                                     : 0);
-  mesh->GetCellData()->AddArray(ghosts);
-  SamplingReport report;
-  sampled(*mesh, resolution(9), report);
-  EXPECT_EQ(report.active, 9u * 9u * 9u - 4u * 4u * 4u);
 }
 
 TEST(MeshSampling, OverlappingCellsGiveTheSameOnAnyNumberOfThreads) {

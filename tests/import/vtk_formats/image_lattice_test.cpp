@@ -1,12 +1,10 @@
 #include "tools/import/vtk_formats/image_lattice.h"
 
 #include <cmath>
-#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include <unistd.h>
 #include <vtkCell.h>
 #include <vtkCellData.h>
 #include <vtkDoubleArray.h>
@@ -119,47 +117,6 @@ TEST(ImageLatticeTest, ImagesThatCannotBe) {
   EXPECT_NE(error_of([&] { lattice_of(image, array, false); }).find("59 values"), std::string::npos);
   image->SetSpacing(1, 0, 1);
   EXPECT_NE(error_of([&] { lattice_of(image, array, false); }).find("spacing"), std::string::npos);
-}
-
-TEST(ImageLatticeTest, WhatOthersHoldIsKept) {
-  const auto image = oblique_image();
-  const auto array = counting<vtkFloatArray>("stress", 9, image->GetNumberOfPoints());
-  read_all(lattice_of(image, array, false));
-  EXPECT_EQ(array->GetNumberOfTuples(), 60);
-  EXPECT_EQ(array->GetComponent(59, 8), 5908);
-}
-
-/// Bytes of this process in memory.
-double resident() {
-  std::ifstream file("/proc/self/statm");
-  double total = 0, pages = 0;
-  file >> total >> pages;
-  return pages * static_cast<double>(::sysconf(_SC_PAGESIZE));
-}
-
-TEST(ImageLatticeTest, MemoryIsGivenBackSliceBySlice) {
-#ifdef TENSORRAY_SANITIZED
-  GTEST_SKIP() << "sanitizers keep memory that was given back";
-#endif
-  constexpr int n = 128;
-  auto image = vtkSmartPointer<vtkImageData>::New();
-  image->SetDimensions(n, n, n);
-  auto array = counting<vtkFloatArray>("stress", 9, image->GetNumberOfPoints());
-  const double data = 4.0 * 9 * n * n * n, before = resident();
-  if (before < data) GTEST_SKIP() << "this system does not tell a process's memory";
-  image->GetPointData()->AddArray(array);
-  vtkDataArray& watched = *array;
-  const Lattice lattice = lattice_of(std::move(image), std::move(array), false);
-  ASSERT_EQ(watched.GetReferenceCount(), 1);
-  std::vector<double> slice(n * n * 9);
-  for (int z = n - 1; z >= 0; --z) {
-    lattice.read_slice(z, slice.data());
-    EXPECT_EQ(slice[9 * 5 + 3], static_cast<float>(100.0 * (n * n * z + 5) + 3));
-    // What remains: the rest of the array, the slice, and a few pages.
-    if (z % 32 == 0) {
-      EXPECT_LT(resident(), before - data * (n - z) / n + 8e6) << z;
-    }
-  }
 }
 
 }  // namespace

@@ -82,19 +82,5 @@ TEST(VtpPoints, FullDiskIsNoticed) {
   }
 }
 
-TEST(VtpPoints, UnwritableFilesAreNoticed) {
-  const PointCloud cloud = cloud_of(10, 0);
-  const TemporaryFolder folder;
-  testing::internal::CaptureStderr();
-  const fs::path missing = folder / "no_such_folder" / "a.vtp";
-  EXPECT_THAT(error_of([&] { write_points(missing, cloud); }), HasSubstr(missing.string()));
-  if (fs::exists("/dev/full")) {
-    const fs::path link = folder / "full.vtp";
-    fs::create_symlink("/dev/full", link);
-    EXPECT_THAT(error_of([&] { write_points(link, cloud); }), HasSubstr(link.string()));
-  }
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-}
-
 }  // namespace
 }  // namespace tensorray

@@ -15,6 +15,7 @@
 // clang-format on
 
 #include "tests/import/mesh_files.h"
+#include "tests/import/vtk_files.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
@@ -29,39 +30,33 @@ double velocity(const double* p, int component, int step) {
 
 void check(int error) { ASSERT_EQ(error, CG_OK) << cg_get_error(); }
 
-/// The names of 32 characters that pointers to solutions are.
-std::string padded(const std::string& name) { return name + std::string(32 - name.size(), ' '); }
-
 void write_zone(int file, int base, const std::string& name, double first_x, int steps) {
   const std::array<cgsize_t, 9> size{points[0], points[1], points[2], points[0] - 1, points[1] - 1, points[2] - 1};
-  int zone = 0, id = 0;
+  int zone = 0, id = 0, solution = 0;
   check(cg_zone_write(file, base, name.c_str(), size.data(), CGNS_ENUMV(Structured), &zone));
-  std::array<std::vector<double>, 3> coordinates;
-  for (cgsize_t k = 0; k < points[2]; ++k)
-    for (cgsize_t j = 0; j < points[1]; ++j)
-      for (cgsize_t i = 0; i < points[0]; ++i) {
-        coordinates[0].push_back(first_x + static_cast<double>(i));
-        coordinates[1].push_back(0.5 * static_cast<double>(j));
-        coordinates[2].push_back(0.25 * static_cast<double>(k));
-      }
+  /// The values at all points.
+  const auto values_of = [&](const auto& value) {
+    std::vector<double> values;
+    for (cgsize_t i = 0; i < points[0] * points[1] * points[2]; ++i) {
+      const double p[3] = {first_x + static_cast<double>(i % points[0]),
+                           0.5 * static_cast<double>(i / points[0] % points[1]),
+                           0.25 * static_cast<double>(i / points[0] / points[1])};
+      values.push_back(value(p));
+    }
+    return values;
+  };
   for (int axis = 0; axis < 3; ++axis)
     check(cg_coord_write(file, base, zone, CGNS_ENUMV(RealDouble), (std::string("Coordinate") + "XYZ"[axis]).c_str(),
-                         coordinates[axis].data(), &id));
+                         values_of([axis](const double* p) { return p[axis]; }).data(), &id));
   std::string solutions;
   for (int step = 0; step < steps; ++step) {
-    int solution = 0;
     const std::string of_step = "Solution" + std::to_string(step);
-    solutions += padded(of_step);
+    solutions += of_step + std::string(32 - of_step.size(), ' ');
     check(cg_sol_write(file, base, zone, of_step.c_str(), CGNS_ENUMV(Vertex), &solution));
-    for (int component = 0; component < 3; ++component) {
-      std::vector<double> values;
-      for (std::size_t i = 0; i < coordinates[0].size(); ++i) {
-        const double p[3] = {coordinates[0][i], coordinates[1][i], coordinates[2][i]};
-        values.push_back(velocity(p, component, step));
-      }
+    for (int c = 0; c < 3; ++c)
       check(cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealDouble),
-                           (std::string("Velocity") + "XYZ"[component]).c_str(), values.data(), &id));
-    }
+                           (std::string("Velocity") + "XYZ"[c]).c_str(),
+                           values_of([=](const double* p) { return velocity(p, c, step); }).data(), &id));
   }
   if (steps == 1) return;
   const std::array<cgsize_t, 2> shape{32, steps};
@@ -77,8 +72,7 @@ void write_cgns(const std::filesystem::path& path, int type, int steps) {
   check(cg_open(path.c_str(), CG_MODE_WRITE, &file));
   check(cg_base_write(file, "Base", 3, 3, &base));
   if (steps > 1) {
-    std::vector<double> times;
-    for (int step = 0; step < steps; ++step) times.push_back(0.5 * (step + 1));
+    const std::vector<double> times{0.5, 1, 1.5};
     const cgsize_t count = steps;
     check(cg_biter_write(file, base, "BaseIterativeData", steps));
     check(cg_goto(file, base, "BaseIterativeData_t", 1, "end"));
@@ -123,10 +117,10 @@ TEST(Cgns, HasStepsOfTime) {
 TEST(Cgns, DamageIsOneLine) {
   const TemporaryFolder folder;
   write_bytes(folder / "none.cgns", "no CGNS");
-  EXPECT_NE(error_of([&] { read_vtk_source(folder / "none.cgns"); }).find("none.cgns"), std::string::npos);
+  EXPECT_NE(read_error(folder / "none.cgns").find("none.cgns"), std::string::npos);
   write_cgns(folder / "a.cgns", CG_FILE_HDF5, 1);
   std::filesystem::resize_file(folder / "a.cgns", std::filesystem::file_size(folder / "a.cgns") / 2);
-  EXPECT_NE(error_of([&] { read_vtk_source(folder / "a.cgns"); }).find("a.cgns"), std::string::npos);
+  EXPECT_NE(read_error(folder / "a.cgns").find("a.cgns"), std::string::npos);
 }
 
 }  // namespace

@@ -74,14 +74,13 @@ TEST(VtkCollection, APartThatIsNamedTwiceForOneTimeCountsOnceOrIsRefused) {
   expect_same(*read_vtk_source(folder / "same.pvd"), *bar(0, 3), 0x1p-1000);
   for (const char* part : {"part=\"0\" ", ""}) {
     write_bytes(folder / "both.pvd", series(a + "<DataSet timestep=\"1\" " + part + "file=\"restarted.vtu\"/>\n"));
-    const std::string error = error_of([&] { read_vtk_source(folder / "both.pvd"); });
+    const std::string error = read_error(folder / "both.pvd");
     EXPECT_NE(error.find("both.pvd: names the same mesh twice for one time, as a.vtu and as restarted.vtu"),
               std::string::npos)
         << error;
   }
   write_bytes(folder / "both.vtm", blocks("<DataSet file=\"a.vtu\"/><DataSet file=\"restarted.vtu\"/>"));
-  EXPECT_NE(error_of([&] { read_vtk_source(folder / "both.vtm"); }).find("names the same mesh twice"),
-            std::string::npos);
+  EXPECT_NE(read_error(folder / "both.vtm").find("names the same mesh twice"), std::string::npos);
 }
 
 TEST(VtkCollection, ErrorsNameTheFile) {
@@ -89,7 +88,7 @@ TEST(VtkCollection, ErrorsNameTheFile) {
   write_xml(*bar(0, 1), folder / "a.vtu");
   const auto refuses = [&](const char* name, const std::string& text, const std::string& file, const char* part) {
     write_bytes(folder / name, text);
-    const std::string error = error_of([&] { read_vtk_source(folder / name); });
+    const std::string error = read_error(folder / name);
     EXPECT_NE(error.find(file), std::string::npos) << error;
     EXPECT_NE(error.find(part), std::string::npos) << error;
   };

@@ -35,11 +35,7 @@ struct Header {
 std::vector<std::string> split(const std::string& text) {
   std::vector<std::string> parts;
   std::istringstream stream(text);
-  for (std::string part; std::getline(stream, part, ',');) {
-    part.erase(0, part.find_first_not_of(" \t\r"));
-    part.erase(part.find_last_not_of(" \t\r") + 1);
-    parts.push_back(part);
-  }
+  for (std::string part; std::getline(stream, part, ',');) parts.push_back(trimmed(part));
   return parts;
 }
 
@@ -57,13 +53,13 @@ void read_line(Header& header, const std::string& line) {
   const std::size_t colon = line.find(':');
   if (colon == std::string::npos) return;
   const std::string name = lower_case(line.substr(0, colon));
-  std::string value = line.substr(std::min(line.size(), line.find_first_not_of(" \t", colon + 1)));
-  value.erase(value.find_last_not_of(" \t\r") + 1);
-  if (name == "dim") header.dim = value;
-  if (name == "vox") header.vox = value;
-  if (name == "layout") header.layout = value;
-  if (name == "datatype") header.datatype = value;
-  if (name == "scaling") header.scaling = value;
+  const std::string value = trimmed(line.substr(colon + 1));
+  for (const auto& [field, text] : {std::pair("dim", &header.dim),
+                                    {"vox", &header.vox},
+                                    {"layout", &header.layout},
+                                    {"datatype", &header.datatype},
+                                    {"scaling", &header.scaling}})
+    if (name == field) *text = value;
   if (name == "transform") header.transform.push_back(value);
   if (name != "file") return;
   if (!header.file.empty())
@@ -76,7 +72,7 @@ Header read_header(const Path& path) {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
   constexpr std::size_t longest = 1 << 22;  // of a header, which may list all gradients
-  const RawBytes bytes = read_some({path, 0, ends_with(lower_case(path.string()), ".gz"), 0}, longest);
+  const auto bytes = read_some({path, 0, ends_with(lower_case(path.string()), ".gz"), 0}, longest);
   std::istringstream stream(std::string(bytes.begin(), bytes.end()));
   Header header{path, {}, {}, {}, {}, {}, {}, {}};
   std::string line;

@@ -8,16 +8,14 @@
 // (https://github.com/ANTsX/ANTs/wiki/Warp-and-reorient-a-diffusion-tensor-image), and so they are read. Vectors and
 // nine components are read in world axes. --frame says otherwise.
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <limits>
 #include <memory>
-#include <stdexcept>
-#include <utility>
-#include <vector>
+#include <optional>
+#include <string>
 
 #include <fmt/format.h>
 #include <nifti2_io.h>
@@ -25,7 +23,7 @@
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "tools/import/lattice_files/lattice_files.h"
-#include "volumes/grids/page_memory.h"
+#include "tools/import/lattice_files/raw_voxels.h"
 
 namespace tensorray {
 namespace {
@@ -34,43 +32,11 @@ using Eigen::Matrix3d;
 
 using Image = std::unique_ptr<nifti_image, decltype(&nifti_image_free)>;
 
-/// The bytes of one component of one slice.
-using Plane = std::vector<char, PageAllocator<char>>;
-
-template <class Number>
-double number(const char* bytes, std::size_t index) {
-  Number value;
-  std::memcpy(&value, bytes + index * sizeof value, sizeof value);
-  return static_cast<double>(value);
-}
-
-using NumberOf = double (*)(const char*, std::size_t);
-
-NumberOf number_reader(int datatype, const std::filesystem::path& path) {
-  switch (datatype) {
-    case NIFTI_TYPE_INT8:
-      return number<std::int8_t>;
-    case NIFTI_TYPE_UINT8:
-      return number<std::uint8_t>;
-    case NIFTI_TYPE_INT16:
-      return number<std::int16_t>;
-    case NIFTI_TYPE_UINT16:
-      return number<std::uint16_t>;
-    case NIFTI_TYPE_INT32:
-      return number<std::int32_t>;
-    case NIFTI_TYPE_UINT32:
-      return number<std::uint32_t>;
-    case NIFTI_TYPE_INT64:
-      return number<std::int64_t>;
-    case NIFTI_TYPE_UINT64:
-      return number<std::uint64_t>;
-    case NIFTI_TYPE_FLOAT32:
-      return number<float>;
-    case NIFTI_TYPE_FLOAT64:
-      return number<double>;
-    default:
-      fail(path, fmt::format("its numbers are {}, not integers or reals", nifti_datatype_string(datatype)));
-  }
+NumberType type_of(int datatype, const std::filesystem::path& path) {
+  const char* const name = nifti_datatype_string(datatype);
+  const std::optional<NumberType> type = number_type(name);
+  if (!type) fail(path, fmt::format("its numbers are {}, not integers or reals", name));
+  return *type;
 }
 
 /// Checks a header, in either byte order, for errors that the library would print.
@@ -80,7 +46,7 @@ void check_header(Header& header, void (*swap)(Header*), const std::filesystem::
   bool sound = header.sizeof_hdr == static_cast<int>(sizeof header) && header.dim[0] >= 1 && header.dim[0] <= 7;
   for (int axis = 1; sound && axis <= header.dim[0]; ++axis) sound = header.dim[axis] >= 1;
   if (!sound) fail(path, "its NIfTI header is damaged");
-  number_reader(header.datatype, path);
+  type_of(header.datatype, path);
 }
 
 struct Close {
@@ -136,47 +102,23 @@ int component_count(const nifti_image& image, const std::filesystem::path& path)
   return static_cast<int>(count);
 }
 
-/// Checks the sizes before memory is allocated. zlib expands one byte to at most 1032.
-void check_sizes(const nifti_image& image, const std::filesystem::path& path, int components) {
-  std::error_code none;
-  const std::uintmax_t bytes = std::filesystem::file_size(image.iname, none);
-  if (none) fail(path, fmt::format("its data file {} is missing", image.iname));
-  const bool compressed = nifti_is_gzfile(image.iname);
-  double needed = static_cast<double>(image.nbyper) * components;
-  for (int axis = 1; axis <= 3; ++axis) {
-    const std::int64_t extent = axis <= image.dim[0] ? image.dim[axis] : 1;
-    if (extent < 1 || extent > std::numeric_limits<int>::max()) fail(path, "its NIfTI header is damaged: sizes");
-    needed *= static_cast<double>(extent);
+/// nifti_image_load is not used, because it replaces numbers that are not finite by zero.
+RawVoxels voxels_of(const nifti_image& image, const std::filesystem::path& path, const Lattice& lattice) {
+  RawVoxels voxels;
+  voxels.type = type_of(image.datatype, path);
+  const ByteOrder host = host_byte_order(), other = host == ByteOrder::little ? ByteOrder::big : ByteOrder::little;
+  voxels.order = image.byteorder == nifti_short_order() ? host : other;
+  voxels.strides = {1, image.nx, image.nx * image.ny, image.nx * image.ny * image.nz};
+  // A slope of zero means no scaling; some programs write NaN instead.
+  if (std::isfinite(image.scl_slope) && image.scl_slope != 0) {
+    voxels.slope = image.scl_slope;
+    voxels.intercept = std::isfinite(image.scl_inter) ? image.scl_inter : 0;
   }
-  if (needed > static_cast<double>(bytes) * (compressed ? 1032 : 1))
-    fail(path, fmt::format("announces {:.0f} bytes of numbers, and holds no more than {}: cut off, or a damaged header",
-                           needed, bytes));
-}
-
-/// The planes of each slice, one for each component. Allocates memory while the numbers are read. nifti_image_load is
-/// not used, because it replaces numbers that are not finite by zero, and because its memory cannot be freed in
-/// parts.
-std::vector<std::vector<Plane>> read_planes(const nifti_image& image, const std::filesystem::path& path,
-                                            int components) {
-  const OpenFile file(znzopen(image.iname, "rb", nifti_is_gzfile(image.iname)));
-  if (!file) fail(path, fmt::format("its data file {} cannot be read", image.iname));
-  if (image.iname_offset < 0 || znzseek(file.get(), image.iname_offset, SEEK_SET) < 0)
-    fail(path, "its NIfTI header is damaged: vox_offset");
-  std::vector<std::vector<Plane>> slices(static_cast<std::size_t>(image.nz));
-  const auto values = static_cast<std::size_t>(image.nx) * static_cast<std::size_t>(image.ny);
-  for (int component = 0; component < components; ++component)
-    for (std::vector<Plane>& slice : slices) {
-      Plane& plane = slice.emplace_back(values * static_cast<std::size_t>(image.nbyper));
-      if (znzread(plane.data(), 1, plane.size(), file.get()) != plane.size())
-        fail(path, "is cut off, or its compressed data are damaged");
-      if (image.swapsize > 1 && image.byteorder != nifti_short_order())
-        nifti_swap_Nbytes(static_cast<std::int64_t>(plane.size() / static_cast<std::size_t>(image.swapsize)),
-                          image.swapsize, plane.data());
-    }
-  char beyond = 0;
-  if (znzread(&beyond, 1, 1, file.get()) > 1)  // zlib compares checksums only at the end of a stream.
-    fail(path, "its compressed data are damaged");
-  return slices;
+  if (image.iname_offset < 0) fail(path, "its NIfTI header is damaged: vox_offset");
+  RawPlace place{image.iname, 0, nifti_is_gzfile(image.iname) != 0, 0};
+  (place.is_compressed ? place.skipped : place.offset) = static_cast<std::uint64_t>(image.iname_offset);
+  voxels.bytes = read_numbers(path, place, voxels.type, lattice.size, lattice.components);
+  return voxels;
 }
 
 bool has_orientation(const nifti_image& image) { return image.sform_code > 0 || image.qform_code > 0; }
@@ -217,8 +159,9 @@ Lattice open_nifti(const std::filesystem::path& given) {
   const Image image = read_header(path);
   Lattice lattice;
   lattice.components = component_count(*image, path);
-  const NumberOf number_of = number_reader(image->datatype, path);
-  check_sizes(*image, path, lattice.components);
+  for (int axis = 1; axis <= std::min<int>(3, static_cast<int>(image->dim[0])); ++axis)
+    if (image->dim[axis] < 1 || image->dim[axis] > std::numeric_limits<int>::max())
+      fail(path, "its NIfTI header is damaged: sizes");
   lattice.size = {static_cast<int>(image->nx), static_cast<int>(image->ny), static_cast<int>(image->nz)};
   lattice.to_world = to_world(*image, path);
   lattice.fsl_frame = axes_of(ComponentFrame::fsl, lattice.to_world.linear());
@@ -235,17 +178,7 @@ Lattice open_nifti(const std::filesystem::path& given) {
     lattice.frame_note =
         "does not say the axes of its symmetric matrices: taken as those of the voxels, as ANTs and dipy write them; "
         "--frame says otherwise";
-  // A slope of zero means no scaling; some programs write NaN instead.
-  const bool scaled = std::isfinite(image->scl_slope) && image->scl_slope != 0;
-  const double slope = scaled ? image->scl_slope : 1;
-  const double intercept = scaled && std::isfinite(image->scl_inter) ? image->scl_inter : 0;
-  const auto slices = std::make_shared<std::vector<std::vector<Plane>>>(read_planes(*image, path, lattice.components));
-  lattice.read_slice = [slices, number_of, slope, intercept, bytes = image->nbyper](int z, double* values) {
-    const std::vector<Plane> planes = std::exchange((*slices)[static_cast<std::size_t>(z)], {});
-    for (std::size_t component = 0; component < planes.size(); ++component)
-      for (std::size_t i = 0; i < planes[component].size() / static_cast<std::size_t>(bytes); ++i)
-        values[i * planes.size() + component] = slope * number_of(planes[component].data(), i) + intercept;
-  };
+  lattice.read_slice = slices_of(voxels_of(*image, path, lattice), lattice.size, lattice.components);
   return lattice;
 }
 

@@ -1,5 +1,4 @@
-// The format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html. Numbers are read from the file
-// slice by slice, and are never all in memory.
+// The format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html.
 
 #include <algorithm>
 #include <array>
@@ -8,8 +7,6 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <memory>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,13 +18,14 @@
 #include "base/text/byte_order.h"
 #include "base/text/text.h"
 #include "tools/import/lattice_files/lattice_files.h"
+#include "tools/import/lattice_files/raw_voxels.h"
 
 namespace tensorray {
 namespace {
 
 /// The contents of the file's header.
 struct Header {
-  std::size_t number_bytes = 0;
+  int number_bytes = 0;
   ByteOrder order = host_byte_order();
   bool fortran = false;  ///< The first index runs fastest.
   std::vector<std::size_t> shape;
@@ -90,7 +88,7 @@ Header read_header(std::ifstream& file, const std::filesystem::path& path) {
   };
   const bool real = one_of(0, "'") && one_of(1, "<>=|") && one_of(2, "f") && one_of(3, "248") && one_of(4, "'");
   if (!real) fail(path, "its numbers are not float16, float32 or float64: save array.astype(\"float32\")");
-  header.number_bytes = static_cast<std::size_t>(descr[3] - '0');
+  header.number_bytes = descr[3] - '0';
   if (descr[1] == '<') header.order = ByteOrder::little;
   if (descr[1] == '>') header.order = ByteOrder::big;
   header.fortran = value_of(dictionary, "fortran_order", path).compare(0, 4, "True") == 0;
@@ -109,7 +107,7 @@ std::size_t component_count(const Header& header, const std::filesystem::path& p
 }
 
 void check_size(const Header& header, const std::filesystem::path& path) {
-  double needed = static_cast<double>(header.number_bytes);
+  double needed = header.number_bytes;
   for (const std::size_t extent : header.shape) needed *= static_cast<double>(extent);
   const auto held = static_cast<double>(std::filesystem::file_size(path)) - static_cast<double>(header.data_start);
   if (needed == held) return;
@@ -118,83 +116,6 @@ void check_size(const Header& header, const std::filesystem::path& path) {
                          held < needed ? "cut off, or a damaged header" : "a damaged header, or several arrays"));
 }
 
-template <class Number>
-double number(const char* bytes, ByteOrder order) {
-  return static_cast<double>(read_number<Number>(bytes, order));
-}
-
-/// Reads slices of a file. In Fortran order the numbers of a slice are scattered over the whole file, so several
-/// slices are read at once.
-class Slices {
- public:
-  Slices(std::filesystem::path path, std::ifstream file, Header header, std::size_t components)
-      : path_(std::move(path)), file_(std::move(file)), header_(std::move(header)), components_(components) {
-    number_of_ = header_.number_bytes == 2   ? number<Eigen::half>
-                 : header_.number_bytes == 4 ? number<float>
-                                             : number<double>;
-  }
-
-  void read(int z, double* values) {
-    const auto slice = static_cast<std::size_t>(z);
-    if (header_.fortran)
-      read_scattered(slice, values);
-    else
-      read_contiguous(slice, values);
-  }
-
- private:
-  std::size_t bytes() const { return header_.number_bytes; }
-  std::size_t slice_numbers() const { return header_.shape[1] * header_.shape[2] * components_; }
-
-  void read_bytes(std::uint64_t offset, std::vector<char>& buffer) {
-    file_.seekg(static_cast<std::streamoff>(header_.data_start + offset));
-    file_.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-    if (!file_) fail(path_, "cannot be read to its end");
-  }
-
-  void read_contiguous(std::size_t z, double* values) {
-    held_.resize(slice_numbers() * bytes());
-    read_bytes(z * held_.size(), held_);
-    for (std::size_t i = 0; i < slice_numbers(); ++i) values[i] = number_of_(&held_[i * bytes()], header_.order);
-  }
-
-  /// A run is the numbers of one component at one x and y, for all z.
-  void read_scattered(std::size_t z, double* values) {
-    if (held_.empty() || z < first_held_) hold_up_to(z);
-    const std::size_t ny = header_.shape[1], nx = header_.shape[2], held = held_.size() / slice_numbers();
-    for (std::size_t run = 0; run < slice_numbers(); ++run) {
-      const std::size_t y = run % ny, x = run / ny % nx, component = run / ny / nx;
-      const std::size_t by_rows = header_.shape.size() == 5 ? component % 3 * 3 + component / 3 : component;
-      values[(y * nx + x) * components_ + by_rows] =
-          number_of_(&held_[run * held + (z - first_held_) * bytes()], header_.order);
-    }
-  }
-
-  /// Reads an eighth of the file's slices, the last of which is `last`.
-  void hold_up_to(std::size_t last) {
-    const std::size_t nz = header_.shape[0], count = std::min(last + 1, (nz + 7) / 8);
-    first_held_ = last + 1 - count;
-    held_.resize(slice_numbers() * count * bytes());
-    const std::size_t runs_at_once = std::max<std::size_t>(1, (1 << 20) / (nz * bytes()));
-    std::vector<char> runs;
-    for (std::size_t run = 0; run < slice_numbers(); run += runs_at_once) {
-      const std::size_t runs_here = std::min(runs_at_once, slice_numbers() - run);
-      runs.resize(runs_here * nz * bytes());
-      read_bytes(std::uint64_t{run} * nz * bytes(), runs);
-      for (std::size_t i = 0; i < runs_here; ++i)
-        std::copy_n(&runs[(i * nz + first_held_) * bytes()], count * bytes(), &held_[(run + i) * count * bytes()]);
-    }
-  }
-
-  std::filesystem::path path_;
-  std::ifstream file_;
-  Header header_;
-  std::size_t components_;
-  double (*number_of_)(const char*, ByteOrder);
-  std::vector<char> held_;      ///< Bytes of one slice or of several slices, run by run.
-  std::size_t first_held_ = 0;  ///< The first of the slices in `held_`.
-};
-
 }  // namespace
 
 Lattice open_npy(const std::filesystem::path& path) {
@@ -202,15 +123,26 @@ Lattice open_npy(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
   std::ifstream file(path, std::ios::binary);
   if (!file) fail(path, "cannot be read");
-  Header header = read_header(file, path);
+  const Header header = read_header(file, path);
   const std::size_t components = component_count(header, path);
   check_size(header, path);
   Lattice lattice;
   for (std::size_t i = 0; i < 3; ++i) lattice.size[static_cast<int>(i)] = static_cast<int>(header.shape[2 - i]);
   lattice.components = static_cast<int>(components);
   if (components == 9) lattice.order = TensorOrder::full;
-  const auto slices = std::make_shared<Slices>(path, std::move(file), std::move(header), components);
-  lattice.read_slice = [slices](int z, double* values) { slices->read(z, values); };
+  const std::int64_t n = lattice.components, x = lattice.size.x(), y = lattice.size.y(), z = lattice.size.z();
+  RawVoxels voxels;
+  voxels.type = {NumberType::Kind::real, header.number_bytes};
+  voxels.order = header.order;
+  voxels.strides = {n, n * x, n * x * y, 1};
+  if (header.fortran) voxels.strides = {z * y, z, 1, z * y * x};
+  voxels.bytes = read_numbers(path, {path, header.data_start}, voxels.type, lattice.size, lattice.components);
+  lattice.read_slice = slices_of(std::move(voxels), lattice.size, lattice.components);
+  if (header.fortran && header.shape.size() == 5)  // The nine numbers are column by column.
+    lattice.read_slice = [read = lattice.read_slice, count = x * y](int slice, double* values) {
+      read(slice, values);
+      for (std::int64_t i = 0; i < count; ++i) Eigen::Map<Eigen::Matrix3d>(values + 9 * i).transposeInPlace();
+    };
   return lattice;
 }
 

@@ -1,9 +1,6 @@
-// Teem reads the header first; then the sizes are checked; then Teem reads the data. Files are read one at a time,
-// because Teem keeps its errors in one list for the whole process.
+// Files are read one at a time, because Teem keeps its errors in one list for the whole process.
 
-#include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -24,6 +21,7 @@
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "tools/import/lattice_files/lattice_files.h"
+#include "tools/import/lattice_files/raw_voxels.h"
 
 namespace tensorray {
 namespace {
@@ -33,11 +31,9 @@ using Eigen::Vector3d;
 
 struct Free {
   void operator()(Nrrd* nrrd) const { nrrdNuke(nrrd); }
-  void operator()(NrrdIoState* state) const { nrrdIoStateNix(state); }
   void operator()(char* text) const { std::free(text); }
 };
 using NrrdPointer = std::unique_ptr<Nrrd, Free>;
-using StatePointer = std::unique_ptr<NrrdIoState, Free>;
 
 /// The role of each axis of the file.
 struct Axes {
@@ -62,9 +58,8 @@ std::string last_error() {
 }
 
 /// Refuses files that Teem would read as another kind (text, pictures), standard input, and patterns of file names,
-/// which Teem passes to printf. @return the header's entry for the data file; empty if the data are in the file
-/// itself.
-std::string check_header(const std::filesystem::path& path) {
+/// which Teem passes to printf.
+void check_header(const std::filesystem::path& path) {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
   std::ifstream file(path, std::ios::binary);
@@ -74,73 +69,30 @@ std::string check_header(const std::filesystem::path& path) {
   std::string data_file;
   while (file.getline(line.data(), static_cast<std::streamsize>(line.size())) && line[0] != '\0' && line[0] != '\r') {
     const std::string text = line.c_str();
-    std::string lower = text;  // Teem ignores case.
-    std::transform(text.begin(), text.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
-    for (const std::string field : {"data file: ", "datafile: "})
-      if (lower.compare(0, field.size(), field) == 0) data_file = text.substr(field.size());
+    for (const std::string field : {"data file: ", "datafile: "})  // Teem ignores case.
+      if (starts_with(lower_case(text), field)) data_file = trimmed(text.substr(field.size()));
   }
   if (file.fail() && !file.eof()) fail(path, "its header is damaged: a line is too long");
-  data_file.erase(0, data_file.find_first_not_of(" \t"));
-  data_file.erase(data_file.find_last_not_of(" \t\r") + 1);
   if (data_file.find('%') != std::string::npos || data_file.compare(0, 4, "LIST") == 0 ||
       data_file.compare(0, 8, "SKIPLIST") == 0)
     fail(path, "its numbers are in several files: join them (unu save -f nrrd -i " + path.filename().string() + ")");
   if (data_file == "-") fail(path, "its data file is standard input");
   if (!data_file.empty() && !std::filesystem::is_regular_file(path.parent_path() / data_file, none))
     fail(path, "its data file " + escaped(data_file) + " is missing, or no file; copy it there too");
-  return data_file;
-}
-
-/// @return the name of the encoding.
-std::string load(const std::filesystem::path& path, Nrrd& nrrd, bool header_only) {
-  const StatePointer state(nrrdIoStateNew());
-  nrrdIoStateSet(state.get(), nrrdIoStateSkipData, header_only ? 1 : 0);
-  if (nrrdLoad(&nrrd, std::filesystem::absolute(path).string().c_str(), state.get()) != 0)
-    fail(path, "damaged or cut off: " + last_error());
-  return state->encoding->name;
-}
-
-/// The greatest number of data bytes that `bytes` of a file can encode. zlib expands one byte to at most 1032, bzip2
-/// to about 20000. As hex text, a byte takes two characters; as ASCII text, a number takes at least one digit and a
-/// space.
-double greatest_content(const std::string& encoding, double bytes, double element_size) {
-  if (encoding == "gzip") return 1032 * bytes;
-  if (encoding == "bzip2") return 20000 * bytes;
-  if (encoding == "hex") return bytes / 2;
-  if (encoding == "ASCII") return element_size * (bytes + 1) / 2;
-  return bytes;
-}
-
-/// Checks the sizes before memory is allocated.
-void check_sizes(const std::filesystem::path& path, const Nrrd& nrrd, const std::string& data_file,
-                 const std::string& encoding) {
-  const std::filesystem::path data = data_file.empty() ? path : path.parent_path() / data_file;
-  std::error_code none;
-  const std::uintmax_t bytes = std::filesystem::file_size(data, none);
-  if (none) fail(path, "its data cannot be read: " + none.message());
-  double needed = static_cast<double>(nrrdElementSize(&nrrd));
-  for (unsigned int axis = 0; axis < nrrd.dim; ++axis) {
-    needed *= static_cast<double>(nrrd.axis[axis].size);
-    if (nrrd.axis[axis].size > static_cast<std::size_t>(std::numeric_limits<int>::max()))
-      fail(path, "its header is damaged: sizes");
-  }
-  const auto element = static_cast<double>(nrrdElementSize(&nrrd));
-  if (needed > greatest_content(encoding, static_cast<double>(bytes), element))
-    fail(path, fmt::format("announces {:.0f} bytes of numbers, and holds no more than {} ({}): cut off, or a damaged "
-                           "header",
-                           needed, bytes, encoding));
 }
 
 NrrdPointer read_nrrd(const std::filesystem::path& path) {
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
   nrrdStateVerboseIO = 0;  // Stop Teem from printing.
-  const std::string data_file = check_header(path);
+  check_header(path);
   NrrdPointer nrrd(nrrdNew());
-  const std::string encoding = load(path, *nrrd, true);
+  if (nrrdLoad(nrrd.get(), std::filesystem::absolute(path).string().c_str(), nullptr) != 0)
+    fail(path, "damaged or cut off: " + last_error());
   if (nrrd->type == nrrdTypeBlock) fail(path, "its type is block, not numbers");
-  check_sizes(path, *nrrd, data_file, encoding);
-  load(path, *nrrd, false);
+  for (unsigned int axis = 0; axis < nrrd->dim; ++axis)
+    if (nrrd->axis[axis].size > static_cast<std::size_t>(std::numeric_limits<int>::max()))
+      fail(path, "its header is damaged: sizes");
   return nrrd;
 }
 
@@ -246,35 +198,24 @@ Matrix3d frame_of(const Nrrd& nrrd, const std::filesystem::path& path) {
   return to_ras(nrrd).asDiagonal() * frame;
 }
 
-/// Reads slices from Teem's array, and frees its memory slice by slice if each slice is contiguous.
-class Slices {
- public:
-  Slices(NrrdPointer nrrd, const Axes& axes) : nrrd_(std::move(nrrd)), component_(axes.component), space_(axes.space) {
-    std::size_t stride = 1;
-    for (unsigned int axis = 0; axis < 4; ++axis) {
-      stride_[axis] = stride;
-      stride *= nrrd_->axis[axis].size;
-    }
+RawVoxels voxels_of(NrrdPointer nrrd, const Axes& axes) {
+  std::array<std::int64_t, 4> strides{};  // Of the axes of the file.
+  std::int64_t stride = 1;
+  for (std::size_t axis = 0; axis < 4; ++axis) {
+    strides[axis] = stride;
+    stride *= static_cast<std::int64_t>(nrrd->axis[axis].size);
   }
-
-  void read(int z, double* values) {
-    const auto lookup = nrrdDLookup[nrrd_->type];
-    const std::size_t first = static_cast<std::size_t>(z) * stride_[space_[2]];
-    for (std::size_t y = 0; y < nrrd_->axis[space_[1]].size; ++y)
-      for (std::size_t x = 0; x < nrrd_->axis[space_[0]].size; ++x)
-        for (std::size_t c = 0; c < nrrd_->axis[component_].size; ++c)
-          *values++ =
-              lookup(nrrd_->data, first + y * stride_[space_[1]] + x * stride_[space_[0]] + c * stride_[component_]);
-    if (space_[2] == 3 && first > 0)
-      if (void* less = std::realloc(nrrd_->data, first * nrrdElementSize(nrrd_.get()))) nrrd_->data = less;
-  }
-
- private:
-  NrrdPointer nrrd_;
-  unsigned int component_;
-  std::array<unsigned int, 3> space_;
-  std::array<std::size_t, 4> stride_{};  ///< Stride of each axis of the file, counted in numbers.
-};
+  using Kind = NumberType::Kind;
+  RawVoxels voxels;
+  voxels.type = {!nrrdTypeIsIntegral[nrrd->type]  ? Kind::real
+                 : nrrdTypeIsUnsigned[nrrd->type] ? Kind::unsigned_integer
+                                                  : Kind::signed_integer,
+                 static_cast<int>(nrrdElementSize(nrrd.get()))};
+  voxels.strides = {strides[axes.space[0]], strides[axes.space[1]], strides[axes.space[2]], strides[axes.component]};
+  const std::shared_ptr<Nrrd> owner = std::move(nrrd);
+  voxels.bytes = {owner, static_cast<const char*>(owner->data)};
+  return voxels;
+}
 
 }  // namespace
 
@@ -292,8 +233,7 @@ Lattice open_nrrd(const std::filesystem::path& path) {
   lattice.frame = frame_of(*nrrd, path);
   lattice.takes_frame = is_anatomical(*nrrd) && !has_frame(*nrrd);
   lattice.zero_is_background = true;
-  const auto slices = std::make_shared<Slices>(std::move(nrrd), axes);
-  lattice.read_slice = [slices](int z, double* values) { slices->read(z, values); };
+  lattice.read_slice = slices_of(voxels_of(std::move(nrrd), axes), lattice.size, lattice.components);
   return lattice;
 }
 

@@ -6,16 +6,20 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <zlib.h>
 
 #include "base/errors.h"
+#include "base/files/descriptor.h"
 #include "base/text/text.h"
 
 namespace tensorray {
 namespace {
 
-constexpr double greatest_expansion = 1032;  // Of zlib.
+constexpr double greatest_expansion = 1032;   // Of zlib.
+constexpr std::uint64_t page_size = 1 << 16;  // The largest of any system.
 
 std::ifstream open_at(const std::filesystem::path& path, std::uint64_t offset) {
   std::ifstream file(path, std::ios::binary);
@@ -45,12 +49,32 @@ void inflate_stream(const RawPlace& place, const Take& take) {
     state = inflate(&stream, Z_NO_FLUSH);
     if (state != Z_OK && state != Z_STREAM_END) fail(place.file, "its compressed data are damaged");
     if (!take(out.data(), out.size() - stream.avail_out)) return;
+    constexpr Bytef gzip = 0x1f;  // With which another stream begins.
+    if (state == Z_STREAM_END && stream.avail_in > 0 && *stream.next_in == gzip) state = inflateReset(&stream);
   }
 }
 
 template <class Number>
 double number(const char* bytes, ByteOrder order) {
   return static_cast<double>(read_number<Number>(bytes, order));
+}
+
+/// The pages of a mapped file.
+struct Mapping {
+  void* pages = nullptr;
+  std::size_t size = 0;
+
+  void operator()(const char*) const { munmap(pages, size); }
+};
+
+/// @param size  > 0; the file has so many bytes.
+std::shared_ptr<const char> map_bytes(const std::filesystem::path& path, std::uint64_t offset, std::size_t size) {
+  const std::uint64_t begin = offset / page_size * page_size;
+  const Descriptor file = open_file(path, O_RDONLY);
+  Mapping mapping{nullptr, static_cast<std::size_t>(offset - begin) + size};
+  mapping.pages = mmap(nullptr, mapping.size, PROT_READ, MAP_PRIVATE, file.get(), static_cast<off_t>(begin));
+  if (mapping.pages == MAP_FAILED) fail(path, "cannot be read");
+  return {static_cast<const char*>(mapping.pages) + (offset - begin), mapping};
 }
 
 using NumberOf = double (*)(const char*, ByteOrder);
@@ -88,8 +112,8 @@ std::optional<NumberType> number_type(const std::string& name) {
   return {};
 }
 
-RawBytes read_some(const RawPlace& place, std::size_t count) {
-  RawBytes bytes;
+std::vector<char, PageAllocator<char>> read_some(const RawPlace& place, std::size_t count) {
+  std::vector<char, PageAllocator<char>> bytes;
   if (!place.is_compressed) {
     std::ifstream file = open_at(place.file, place.offset + place.skipped);
     bytes.resize(count);
@@ -108,8 +132,8 @@ RawBytes read_some(const RawPlace& place, std::size_t count) {
   return bytes;
 }
 
-RawBytes read_numbers(const std::filesystem::path& path, const RawPlace& place, const NumberType& type,
-                      const Eigen::Vector3i& size, int components) {
+std::shared_ptr<const char> read_numbers(const std::filesystem::path& path, const RawPlace& place,
+                                         const NumberType& type, const Eigen::Vector3i& size, int components) {
   std::error_code none;
   const std::uintmax_t bytes = std::filesystem::file_size(place.file, none);
   if (none || !std::filesystem::is_regular_file(place.file, none))
@@ -121,9 +145,11 @@ RawBytes read_numbers(const std::filesystem::path& path, const RawPlace& place, 
                            "header",
                            needed, std::max(0.0, held - static_cast<double>(place.skipped))));
   const auto count = static_cast<std::size_t>(needed);
-  RawBytes numbers = read_some(place, count);
-  if (numbers.size() != count) fail(path, "is cut off, or its compressed data are damaged");
-  return numbers;
+  if (!place.is_compressed) return map_bytes(place.file, place.offset + place.skipped, count);
+  // One byte more, because zlib compares checksums only at the end of a stream.
+  const auto numbers = std::make_shared<std::vector<char, PageAllocator<char>>>(read_some(place, count + 1));
+  if (numbers->size() < count) fail(path, "is cut off, or its compressed data are damaged");
+  return {numbers, numbers->data()};
 }
 
 std::function<void(int z, double* values)> slices_of(RawVoxels voxels, const Eigen::Vector3i& size, int components) {
@@ -136,9 +162,11 @@ std::function<void(int z, double* values)> slices_of(RawVoxels voxels, const Eig
         for (int c = 0; c < components; ++c) {
           const std::int64_t index = held->first + x * x_stride + y * y_stride + z * z_stride + c * component_stride;
           *values++ =
-              held->slope * number_of(&held->bytes[static_cast<std::size_t>(index * held->type.bytes)], held->order) +
-              held->intercept;
+              held->slope * number_of(held->bytes.get() + index * held->type.bytes, held->order) + held->intercept;
         }
+    // They need not stay in memory: the system has the file.
+    if (const auto* const mapping = std::get_deleter<Mapping>(held->bytes))
+      madvise(mapping->pages, mapping->size, MADV_DONTNEED);
   };
 }
 

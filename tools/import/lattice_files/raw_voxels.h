@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,22 +28,20 @@ struct NumberType {
 /// The type with a name as in "Float32", "uint8", without a byte order; nothing if there is no such type.
 std::optional<NumberType> number_type(const std::string& name);
 
-using RawBytes = std::vector<char, PageAllocator<char>>;
-
 /// Where bytes are in a file.
 struct RawPlace {
   std::filesystem::path file;
   std::uint64_t offset = 0;    ///< Of the bytes, or of the compressed stream.
-  bool is_compressed = false;  ///< A stream of zlib or gzip, which ends with the file or before.
+  bool is_compressed = false;  ///< A stream of zlib, or streams of gzip, which end with the file or before.
   std::uint64_t skipped = 0;   ///< Bytes of the stream's contents that are before the wanted ones.
 };
 
 /// Reads at most `count` bytes. @throw std::runtime_error naming the file: it cannot be read, or its stream is damaged.
-RawBytes read_some(const RawPlace& place, std::size_t count);
+std::vector<char, PageAllocator<char>> read_some(const RawPlace& place, std::size_t count);
 
 /// Numbers of voxels.
 struct RawVoxels {
-  RawBytes bytes;
+  std::shared_ptr<const char> bytes;
   NumberType type;
   ByteOrder order = host_byte_order();
   std::int64_t first = 0;                 ///< Which number is component 0 of voxel (0, 0, 0).
@@ -50,10 +49,11 @@ struct RawVoxels {
   double slope = 1, intercept = 0;        ///< The value is slope · number + intercept.
 };
 
-/// Reads the numbers of size.x() · size.y() · size.z() · components values, and checks first that the file may hold
-/// them. @throw std::runtime_error naming `path`, the file that the user gave.
-RawBytes read_numbers(const std::filesystem::path& path, const RawPlace& place, const NumberType& type,
-                      const Eigen::Vector3i& size, int components);
+/// The numbers of size.x() · size.y() · size.z() · components values: what is not compressed is mapped, and read when
+/// it is needed, so that the file must not change meanwhile. Checks first that the file may hold them.
+/// @throw std::runtime_error naming `path`, the file that the user gave.
+std::shared_ptr<const char> read_numbers(const std::filesystem::path& path, const RawPlace& place,
+                                         const NumberType& type, const Eigen::Vector3i& size, int components);
 
 /// The `read_slice` of a lattice (lattice.h).
 std::function<void(int z, double* values)> slices_of(RawVoxels voxels, const Eigen::Vector3i& size, int components);

@@ -23,8 +23,7 @@ int read_vtp(int argc, char** argv) {
   return tensorray::answer_parent([&] {
     if (argc < 4) throw std::runtime_error("--read-vtp is for tensorray alone");
     const std::set<std::string> wanted(argv + 4, argv + argc);
-    const tensorray::PolyData data = tensorray::read_vtp_file(argv[3], wanted);
-    tensorray::write_poly_data(argv[2], view_of(data));
+    tensorray::write_poly_lines(argv[2], tensorray::read_vtp_file(argv[3], wanted));
   });
 }
 

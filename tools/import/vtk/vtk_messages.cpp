@@ -1,8 +1,11 @@
 #include "tools/import/vtk/vtk_messages.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <stdexcept>
 
+#include <fcntl.h>
+#include <unistd.h>
 #include <vtkCallbackCommand.h>
 #include <vtkCommand.h>
 #include <vtkLogger.h>
@@ -47,6 +50,13 @@ VtkMessages::VtkMessages()
       verbosity_(vtkLogger::GetCurrentVerbosityCutoff()) {
   vtkOutputWindow::GetInstance()->SetDisplayMode(vtkOutputWindow::NEVER);
   vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
+#ifndef TENSORRAY_SANITIZED
+  std::fflush(stderr);
+  if (const Descriptor nowhere = open_file("/dev/null", O_WRONLY); nowhere.is_open()) {
+    stderr_ = Descriptor(fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3));
+    if (stderr_.is_open()) dup2(nowhere.get(), STDERR_FILENO);
+  }
+#endif
 }
 
 VtkMessages::~VtkMessages() {
@@ -55,6 +65,9 @@ VtkMessages::~VtkMessages() {
   window->RemoveObserver(warning_observer_);
   window->SetDisplayMode(display_mode_);
   vtkLogger::SetStderrVerbosity(vtkLogger::ConvertToVerbosity(verbosity_));
+  if (!stderr_.is_open()) return;
+  std::fflush(stderr);
+  dup2(stderr_.get(), STDERR_FILENO);
 }
 
 void VtkMessages::keep(const char* message, bool is_error) {

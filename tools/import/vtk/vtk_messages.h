@@ -6,10 +6,14 @@
 #include <filesystem>
 #include <string>
 
+#include "base/files/descriptor.h"
+
 namespace tensorray {
 
-/// Until it is destroyed, keeps VTK's errors and warnings instead of printing them. VTK has one output per process:
-/// only one VtkMessages may exist at a time, and no other thread may use VTK meanwhile.
+/// Until it is destroyed, keeps VTK's errors and warnings instead of printing them, and drops what is written to
+/// standard error: netCDF and the C++ runtime write there directly. (Not in a program built with a sanitizer, whose
+/// report would be lost.) VTK has one output per process: only one VtkMessages may exist at a time, and no other thread
+/// may use VTK meanwhile.
 class VtkMessages {
  public:
   VtkMessages();
@@ -33,6 +37,7 @@ class VtkMessages {
   std::string error_, warning_;
   unsigned long error_observer_, warning_observer_;
   int display_mode_, verbosity_;
+  Descriptor stderr_;  ///< What standard error was.
 };
 
 /// Until it is destroyed, drops VTK's errors and warnings. Use it for work on data that have been read, where VTK

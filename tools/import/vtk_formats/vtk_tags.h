@@ -3,6 +3,8 @@
 /// The tags of VTK's XML files, without a parser: files may be large, and have bytes between tags. Private to the
 /// importer.
 
+#include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -26,6 +28,18 @@ inline std::string attribute(const std::string& text, const std::string& name) {
   return attribute(text, name, from);
 }
 
+/// What reading a file may take at most, bytes: a small one may announce any number of points. (LZMA makes 7000 bytes
+/// of one; threads have stacks.)
+inline double most_memory_of(const std::filesystem::path& path) {
+  return 0x1p30 + 8000.0 * static_cast<double>(std::filesystem::file_size(path));
+}
+
+/// Whether a tag of an array, or any other, announces a number of components that VTK can take time and memory for.
+inline bool has_possible_components(const std::string& tag) {
+  const double components = std::strtod(attribute(tag, "NumberOfComponents").c_str(), nullptr);
+  return components >= 0 && components <= 100000;
+}
+
 /// Calls `visit(tag)` for each tag, without its brackets, up to the appended data.
 template <class Visit>
 void for_each_tag(const std::filesystem::path& path, const Visit& visit) {
@@ -35,6 +49,16 @@ void for_each_tag(const std::filesystem::path& path, const Visit& visit) {
     if (tag.compare(0, 12, "AppendedData") == 0) return;
     visit(tag);
   }
+}
+
+/// Whether a file ends with the tag that closes it: VTK does not check the end of appended data.
+inline bool is_closed(const std::filesystem::path& path) {
+  const auto size = static_cast<std::streamoff>(std::filesystem::file_size(path));
+  std::string tail(static_cast<std::size_t>(std::min<std::streamoff>(size, 256)), '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(size - static_cast<std::streamoff>(tail.size()));
+  file.read(tail.data(), static_cast<std::streamsize>(tail.size()));
+  return tail.find("</VTKFile>") != std::string::npos;
 }
 
 }  // namespace tensorray

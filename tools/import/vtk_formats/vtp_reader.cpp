@@ -1,9 +1,8 @@
-#include <algorithm>
 #include <charconv>
 #include <cstdint>
-#include <cstring>
-#include <fstream>
+#include <map>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -17,9 +16,10 @@
 #include <vtkPolyData.h>
 #include <vtkXMLPolyDataReader.h>
 
+#include "base/process/process_limits.h"
 #include "base/text/text.h"
 #include "tools/import/vtk/vtk_messages.h"
-#include "tools/import/vtk_formats/vtk_counts.h"
+#include "tools/import/vtk_formats/vtk_tags.h"
 #include "tools/import/vtk_formats/vtp_files.h"
 
 namespace tensorray {
@@ -32,77 +32,46 @@ using Indices = std::vector<vtkIdType>;
   throw std::runtime_error(what + ": the file is damaged or cut off; write it again");
 }
 
-std::string read_part(const Path& path, std::uintmax_t offset, std::size_t count) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text(count, '\0');
-  file.seekg(static_cast<std::streamoff>(offset));
-  file.read(&text[0], static_cast<std::streamsize>(count));
-  text.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-  return text;
+/// What the tags of a file say that VTK does not check.
+struct Tags {
+  int pieces = 0;
+  std::map<std::string, int> arrays;  ///< How many have a name.
+};
+
+/// VTK takes a count that it cannot read for 0, and leaves out what it counts.
+void check_counts(const std::string& piece) {
+  for (const char* name : {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys"}) {
+    if (piece.find(name) == std::string::npos) continue;
+    const std::string text = attribute(piece, name);
+    std::int64_t count = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+    if (error != std::errc() || count < 0 || end != text.data() + text.size())
+      fail_damaged(std::string("its ") + name + " is no count");
+  }
 }
 
-/// VTK's message about a file of another kind does not help the user, and VTK does not check the end of appended
-/// data.
-void check_kind_and_end(const Path& path) {
-  constexpr std::size_t head_size = 4096, tail_size = 256;
-  const std::string head = read_part(path, 0, head_size);
-  const std::size_t root = head.find("<VTKFile");
-  if (root == std::string::npos) throw std::runtime_error("it is not VTK polydata in VTK's XML format");
-  const std::string tag = head.substr(root, head.find('>', root) - root);
-  const std::size_t type = tag.find("type=");
-  const std::string rest = type == std::string::npos ? "" : tag.substr(type + 5);
-  if (rest.size() < 2 || rest.compare(1, 9, std::string("PolyData") + rest[0]) != 0) {
-    const std::string found = rest.empty() ? "" : rest.substr(1, rest.find(rest[0], 1) - 1);
-    throw std::runtime_error("it is not VTK polydata but \"" + escaped(found) + "\"");
-  }
-  const std::uintmax_t size = std::filesystem::file_size(path),
-                       begin = size - std::min<std::uintmax_t>(size, tail_size);
-  std::string tail = read_part(path, begin, tail_size);
-  tail.erase(tail.find_last_not_of(" \t\r\n") + 1);
-  if (!ends_with(tail, "</VTKFile>")) fail_damaged("its end is missing");
+/// VTK's message about a file of another kind does not help the user.
+Tags read_tags(const Path& path) {
+  Tags tags;
+  std::optional<std::string> type;
+  for_each_tag(path, [&](const std::string& tag) {
+    if (starts_with(tag, "VTKFile")) type = attribute(tag, "type");
+    if (starts_with(tag, "Piece")) {
+      ++tags.pieces;
+      check_counts(tag);
+    }
+    if (starts_with(tag, "DataArray")) ++tags.arrays[attribute(tag, "Name")];
+    if (!has_possible_components(tag)) fail_damaged("one of its arrays has no such number of components");
+  });
+  if (!type) throw std::runtime_error("it is not VTK polydata in VTK's XML format");
+  if (type != "PolyData") throw std::runtime_error("it is not VTK polydata but \"" + escaped(*type) + "\"");
+  if (!is_closed(path)) fail_damaged("its end is missing");
+  return tags;
 }
 
 void choose(vtkDataArraySelection& arrays, const std::set<std::string>& wanted) {
   for (int i = 0; i < arrays.GetNumberOfArrays(); ++i)
     if (wanted.count(arrays.GetArrayName(i)) == 0) arrays.DisableArray(arrays.GetArrayName(i));
-}
-
-std::size_t occurrences(const std::string& text, const std::string& part) {
-  std::size_t count = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + part.size())) ++count;
-  return count;
-}
-
-/// The file without its appended data.
-std::string xml_of(const Path& path) {
-  std::string text = read_part(path, 0, std::filesystem::file_size(path));
-  text.resize(std::min(text.size(), text.find("<AppendedData")));
-  return text;
-}
-
-/// VTK takes a count that it cannot read for 0, and leaves out what it counts.
-void check_counts(const std::string& text) {
-  for (std::size_t at = text.find("<Piece"); at != std::string::npos; at = text.find("<Piece", at + 1)) {
-    const std::string tag = text.substr(at, text.find('>', at) - at);
-    for (const char* name : {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys"}) {
-      const std::size_t found = tag.find(name + std::string("="));
-      if (found == std::string::npos) continue;
-      const std::size_t begin = std::min(found + std::strlen(name) + 2, tag.size());  // Behind a quotation mark.
-      std::int64_t count = 0;
-      const auto result = std::from_chars(tag.data() + begin, tag.data() + tag.size(), count);
-      const bool ends = result.ptr != tag.data() + tag.size() && (*result.ptr == '"' || *result.ptr == '\'');
-      if (result.ec != std::errc() || count < 0 || !ends) fail_damaged(std::string("its ") + name + " is no count");
-    }
-  }
-}
-
-/// The arrays that each piece of the file has. VTK leaves the values of the other pieces undefined.
-std::set<std::string> in_every_piece(const std::string& text, const std::set<std::string>& wanted) {
-  const std::size_t pieces = occurrences(text, "<Piece");
-  std::set<std::string> complete;
-  for (const std::string& name : wanted)
-    if (pieces <= 1 || occurrences(text, "Name=\"" + name + "\"") >= pieces) complete.insert(name);
-  return complete;
 }
 
 /// The points and lines whose values are read. VTK orders cells as vertices, then lines.
@@ -132,7 +101,7 @@ Selection selection_of(vtkPolyData& polydata) {
   return selection;
 }
 
-DataArray doubles(vtkDataArray& array, const Indices& selected) {
+PolyLines::Values doubles(vtkDataArray& array, const Indices& selected) {
   const int components = array.GetNumberOfComponents();
   std::vector<double> values;
   values.reserve(selected.size() * static_cast<std::size_t>(components));
@@ -142,9 +111,9 @@ DataArray doubles(vtkDataArray& array, const Indices& selected) {
 }
 
 /// The wanted numeric arrays that have `count` values.
-Named<DataArray> chosen(vtkDataSetAttributes& attributes, const std::set<std::string>& wanted, vtkIdType count,
-                        const Indices& selected) {
-  Named<DataArray> arrays;
+Named<PolyLines::Values> chosen(vtkDataSetAttributes& attributes, const std::set<std::string>& wanted, vtkIdType count,
+                                const Indices& selected) {
+  Named<PolyLines::Values> arrays;
   for (const std::string& name : wanted) {
     vtkDataArray* const array = attributes.GetArray(name.c_str());
     if (!array) continue;
@@ -155,9 +124,8 @@ Named<DataArray> chosen(vtkDataSetAttributes& attributes, const std::set<std::st
   return arrays;
 }
 
-PolyData lines_of(vtkPolyData& polydata, const std::set<std::string>& wanted) {
-  PolyData data;
-  data.has_lines = true;
+PolyLines lines_of(vtkPolyData& polydata, const std::set<std::string>& wanted) {
+  PolyLines data;
   const Selection selection = selection_of(polydata);
   if (!selection.points.empty()) data.points = doubles(*polydata.GetPoints()->GetData(), selection.points);
   data.line_ends = selection.line_ends;
@@ -168,12 +136,13 @@ PolyData lines_of(vtkPolyData& polydata, const std::set<std::string>& wanted) {
 
 }  // namespace
 
-PolyData read_vtp_file(const Path& path, const std::set<std::string>& asked) {
-  check_kind_and_end(path);
-  const std::string text = xml_of(path);
-  check_counts(text);
-  if (const std::string reason = impossible_xml_count(path); !reason.empty()) throw std::runtime_error("it " + reason);
-  const std::set<std::string> wanted = in_every_piece(text, asked);
+PolyLines read_vtp_file(const Path& path, const std::set<std::string>& asked) {
+  const Tags tags = read_tags(path);
+  std::set<std::string> wanted;  // Of an array that some pieces lack, VTK leaves the values there undefined.
+  for (const std::string& name : asked)
+    if (const auto found = tags.arrays.find(name); found != tags.arrays.end() && found->second >= tags.pieces)
+      wanted.insert(name);
+  const ExtraMemoryLimit limit(most_memory_of(path));
   const VtkMessages messages;
   try {
     vtkNew<vtkXMLPolyDataReader> reader;
