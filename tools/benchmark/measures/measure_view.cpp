@@ -89,7 +89,7 @@ Json measure_job(const Options& options, const ViewJob& job) {
   Pages pages(viewed, progress);
   TimedPage page(pages);
   Json scene = scene_json(viewed.file, viewed.overrides);
-  const double scale = page.picture_of(scene, true).at("scale");
+  const double scale = page.picture_of(scene, true).at("/chosen/field/scale"_json_pointer);
   Json result{{"scene", job.name}, {"side", side}};
   result.update(drag(page, scene, scale, steps));
   std::vector<double> finals;
