@@ -67,7 +67,7 @@ void describe(BendingDescription& bending, Visitor& visit) {
   visit("a", bending.flexibility.a, "constant part of the flexibility of light, s = a + b * wavelength", knob(-2, 2));
   visit("b", bending.flexibility.b, "slope of the flexibility of light, s = a + b * wavelength, per nm",
         knob(-0.004, 0.004));
-  visit("rgb", bending.rgb, "three flexibilities, one for each colour channel, instead of wavelengths", knob());
+  visit("rgb", bending.rgb, "three flexibilities, one for each colour channel, instead of wavelengths");
   visit("method", bending.settings.method,
         "how rays are integrated; auto is splitting4 between cubic voxels, splitting between linear ones");
   visit("step", bending.settings.step,
