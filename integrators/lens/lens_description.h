@@ -96,15 +96,17 @@ void describe(ImagePlaneDescription& plane, Visitor& visit) {
 
 template <class Visitor>
 void describe(LensDescription& lens, Visitor& visit) {
-  visit("mode", lens.mode, "lens: gather looks back from every pixel; scatter sends the image's light to the receiver");
-  visit("image", lens.image, "lens: the picture that is seen: a file, or checkerboard, grid, color_wheel, line");
+  visit("mode", lens.mode, "lens: gather looks back from every pixel; scatter sends the image's light to the receiver",
+        knob());
+  visit("image", lens.image, "lens: the picture that is seen: a file, or checkerboard, grid, color_wheel, line",
+        knob());
   visit("image_color_space", lens.image_color_space, "lens: OpenColorIO space of the file; auto: by its format",
         Limits().or_word("auto"));
   visit("image_layer", lens.image_layer, "lens: layer of the file (.exr); default: R, G, B, or the first layer");
   visit.section("image_plane", lens.plane, "lens: position and size of the image");
   visit("wrap", lens.wrap, "lens: how the image continues beyond its edges (gather)");
   visit("samples", lens.samples, "lens: samples of a pixel along x and along y", between(1, 16));
-  visit("overlay", lens.overlay, "lens: grid draws straight and distorted grid lines over the picture");
+  visit("overlay", lens.overlay, "lens: grid draws straight and distorted grid lines over the picture", knob());
   visit("obstacles", lens.obstacles, "lens: shaded draws the obstacles where no light of the image arrives");
 }
 

@@ -57,8 +57,8 @@ inline auto choices(Background) {
 
 template <class Visitor>
 void describe(SeedDescription& seeds, Visitor& visit) {
-  visit("kind", seeds.kind, "how seeds are spread: on the entry plane (grid, poisson_disk), or in the volume");
-  visit("count", seeds.count, "approximate number of seeds", between(1, 2e6));
+  visit("kind", seeds.kind, "how seeds are spread: on the entry plane (grid, poisson_disk), or in the volume", knob());
+  visit("count", seeds.count, "approximate number of seeds", between(1, 2e6).as_knob(1, 5000));
   visit("from", seeds.from, "line: one end, world; default: an end of a line across the middle of the volume");
   visit("to", seeds.to, "line: the other end, world; default: as for `from`");
   visit("center", seeds.center, "sphere: middle, world; default: that of the volume");
@@ -86,9 +86,9 @@ void describe(RadiusDescription& radius, Visitor& visit) {
 
 template <class Visitor>
 void describe(PathColorDescription& color, Visitor& visit) {
-  visit("by", color.by, "quantity that is shown as colour: force is |T V|, curvature |V'|");
+  visit("by", color.by, "quantity that is shown as colour: force is |T V|, curvature |V'|", knob());
   visit("invariant", color.invariant, "by invariant: the invariant");
-  visit("map", color.map, "colormap");
+  visit("map", color.map, "colormap", knob());
   visit("range", color.range, "values at the ends of the map; default: the 1st and the 99th percentile");
   visit("logarithmic", color.logarithmic, "logarithmic colour scale");
   visit("legend", color.legend, "draw a colour bar into output.image");
@@ -128,31 +128,35 @@ void describe(PathTracingDescription& paths, Visitor& visit) {
         endings({".vtp", ".tck"}));
   visit("backwards", paths.backwards, "path_tracing: also follow light back from seeds in the volume");
   visit("outside", paths.outside, "path_tracing: draw the straight pieces before and behind the volume, too");
-  visit("style", paths.style, "path_tracing: how paths are drawn");
+  visit("style", paths.style, "path_tracing: how paths are drawn", knob());
   visit("caps", paths.caps, "path_tracing: form of the ends of tubes");
   visit.section("radius", paths.radius, "path_tracing: size of the ellipses");
   visit.section("color", paths.color, "path_tracing: colour of the paths");
   visit.section("material", paths.material, "path_tracing: material of the paths");
   visit.section("context", paths.context, "path_tracing: surfaces that are shown besides the paths");
-  visit("shading", paths.shading, "path_tracing: path is physically based; the others are fast previews");
-  visit("bands", paths.bands, "path_tracing: number of wavelengths of the light that shows the paths",
+  visit("shading", paths.shading, "path_tracing, scene: path is physically based; the others are fast previews",
+        knob());
+  visit("bands", paths.bands, "path_tracing, scene: number of wavelengths of the light that shows the paths",
         between(3, 1000));
   visit("max_depth", paths.max_depth,
-        "path_tracing: greatest number of surfaces that light meets; 1: direct light only", between(1, 1000));
+        "path_tracing, scene: greatest number of surfaces that light meets; 1: direct light only", between(1, 1000));
   visit("indirect_clamp", paths.indirect_clamp,
-        "path_tracing: most that light scattered twice or more adds to a sample, where the strongest light has the "
+        "path_tracing, scene: most that light scattered twice or more adds to a sample, where the strongest light has "
+        "the "
         "strength 1; 0: no limit",
         at_least(0));
-  visit("max_samples", paths.samples, "path_tracing: greatest number of samples per pixel", between(1, 1e6));
-  visit("min_samples", paths.min_samples, "path_tracing: least number of samples per pixel", between(1, 1e6));
+  visit("max_samples", paths.samples, "path_tracing, scene: greatest number of samples per pixel", between(1, 1e6));
+  visit("min_samples", paths.min_samples, "path_tracing, scene: least number of samples per pixel", between(1, 1e6));
   visit("noise", paths.noise,
-        "path_tracing: relative error at which a pixel is finished; 0: every pixel takes max_samples", between(0, 1));
+        "path_tracing, scene: relative error at which a pixel is finished; 0: every pixel takes max_samples",
+        between(0, 1));
   visit("max_seconds", paths.max_seconds,
-        "path_tracing: time after which no pixel takes more samples, seconds; the picture then depends on the machine",
+        "path_tracing, scene: time after which no pixel takes more samples, seconds; the picture then depends on the "
+        "machine",
         above(0));
-  visit("filter", paths.filter, "path_tracing: pixel filter");
-  visit("background", paths.background, "path_tracing: what pixels without a surface show");
-  visit("background_color", paths.background_color, "path_tracing: colour of the background, linear Rec. 709",
+  visit("filter", paths.filter, "path_tracing, scene: pixel filter");
+  visit("background", paths.background, "path_tracing, scene: what pixels without a surface show");
+  visit("background_color", paths.background_color, "path_tracing, scene: colour of the background, linear Rec. 709",
         at_least(0));
 }
 

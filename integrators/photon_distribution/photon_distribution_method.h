@@ -49,13 +49,14 @@ inline DensitySettings estimator_of(const PhotonDensity& density) {
 
 template <class Visitor>
 void describe(PhotonDensity& density, Visitor& visit) {
-  visit("kind", density.kind, "method that computes irradiance from rays");
-  visit("tolerance", density.tolerance, "mesh: wanted error of landings, in pixels", between(0.001, 100));
+  visit("kind", density.kind, "method that computes irradiance from rays", knob());
+  visit("tolerance", density.tolerance, "mesh: wanted error of landings, in pixels",
+        between(0.001, 100).as_knob(0.05, 5));
   visit("error", density.error, "mesh: refine until the picture's relative error is below this, instead of `tolerance`",
         between(1e-5, 1));
-  visit("tau", density.tau, "gaussian: standard deviation, in pixels", between(0.3, 1000));
+  visit("tau", density.tau, "gaussian: standard deviation, in pixels", between(0.3, 1000).as_knob(0.3, 50));
   visit("footprint", density.footprint, "photon_differential: standard deviation, in spacings of the photons",
-        between(0.01, 100));
+        between(0.01, 100).as_knob(0.1, 10));
 }
 
 template <class Visitor>

@@ -57,7 +57,7 @@ void describe(PhotonsDescription& photons, Visitor& visit) {
 
 template <class Visitor>
 void describe(SceneMethodDescription& settings, Visitor& visit) {
-  visit("conserve", settings.conserve, "scene: what light keeps in the field: a photon's power, or radiance");
+  visit("conserve", settings.conserve, "scene: what light keeps in the field: a photon's power, or radiance", knob());
   visit("bands_per_sample", settings.bands_per_sample,
         "scene: bands that a sample follows into the volume; divides `bands`", between(1, 1000));
   visit("max_gain", settings.most_radiance_scale,

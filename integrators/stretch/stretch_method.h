@@ -29,9 +29,10 @@ void describe(StretchDescription& stretch, Visitor& visit) {
   visit("length", stretch.length,
         "length over which light is followed, world units; default: the volume's depth along the light", above(0));
   visit("wavelength", stretch.wavelength, "wavelength of the light, nm; default: 550, in RGB mode green",
-        between(observer_min, observer_max));
+        between(observer_min, observer_max).as_knob());
   visit("resolution", stretch.resolution, "resolution of the grid: voxels along the longest side", between(2, 4096));
-  visit("pixels", stretch.pixels, "resolution of the picture: pixels along the longer side", between(1, 32768));
+  visit("pixels", stretch.pixels, "resolution of the picture: pixels along the longer side",
+        between(1, 32768).as_knob(32, 2048));
 }
 
 template <class Visitor>

@@ -40,7 +40,8 @@ struct TraceRequest {
   bool paths = false;
 };
 
-struct Traced {
+/// Some of the rays, which one thread traces.
+struct TracedBatch {
   RayBatch rays;
   std::vector<std::vector<Eigen::Vector3d>> ways;  ///< Of each ray; or empty.
 };
@@ -64,9 +65,12 @@ void check(const TraceRequest& request) {
   require(request.smooth >= 0 && request.smooth <= greatest_smoothing, "trace: smooth must be 0 to 20 voxels");
 }
 
-RayBatch batch_of(const TraceRequest& request) {
-  RayBatch rays;
+std::vector<TracedBatch> batches_of(const TraceRequest& request) {
+  const py::ssize_t size = request.paths ? 64 : 512;  // Ctrl-C waits for one, and rays with ways may be long.
+  std::vector<TracedBatch> batches;
   for (py::ssize_t i = 0; i < request.flexibilities.size(); ++i) {
+    if (i % size == 0) batches.emplace_back();
+    RayBatch& rays = batches.back().rays;
     rays.add(Eigen::Vector3d(request.positions.data() + 3 * i), Eigen::Vector3d(request.directions.data() + 3 * i),
              request.flexibilities.data()[i]);
     if (!request.along && !request.turning) continue;
@@ -75,18 +79,7 @@ RayBatch batch_of(const TraceRequest& request) {
     if (request.turning) differential.direction = columns(request.turning->data() + 6 * i);
     rays.differentials.push_back(differential);
   }
-  return rays;
-}
-
-template <class T>
-std::vector<T> slice(const std::vector<T>& all, std::size_t begin, std::size_t end) {
-  if (all.empty()) return {};
-  return {all.begin() + static_cast<std::ptrdiff_t>(begin), all.begin() + static_cast<std::ptrdiff_t>(end)};
-}
-
-template <class T>
-void put(std::vector<T>& all, std::size_t begin, std::vector<T>& part) {
-  std::move(part.begin(), part.end(), all.begin() + static_cast<std::ptrdiff_t>(begin));
+  return batches;
 }
 
 /// The positions of a ray's points.
@@ -97,32 +90,24 @@ std::vector<Eigen::Vector3d> way(const TensorField& field, const RayRecord& reco
   return positions;
 }
 
-/// Follows all rays, on all threads: in batches, as a batch belongs to one thread.
+/// Follows all rays, on all threads.
 void trace_all(const TensorField& field, const Geometry& geometry, const BendingSettings& bending, bool with_ways,
-               Traced& traced, const Progress& progress) {
-  const std::size_t batch_size = with_ways ? 64 : 512;  // Ctrl-C waits for one, and rays with ways may be long.
-  RayBatch& rays = traced.rays;
-  rays.end.resize(rays.size());
-  rays.length.resize(rays.size());
-  rays.steps.resize(rays.size());
-  traced.ways.resize(with_ways ? rays.size() : 0);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), batch_size), [&](const auto& range) {
+               std::vector<TracedBatch>& batches, const Progress& progress) {
+  tbb::parallel_for(std::size_t{0}, batches.size(), [&](std::size_t i) {
     if (progress.cancelled) throw Cancelled();
-    RayBatch batch;
-    batch.position = slice(rays.position, range.begin(), range.end());
-    batch.direction = slice(rays.direction, range.begin(), range.end());
-    batch.flexibility = slice(rays.flexibility, range.begin(), range.end());
-    batch.differentials = slice(rays.differentials, range.begin(), range.end());
     std::vector<RayRecord> records;
-    trace(field, geometry, bending, batch, with_ways ? &records : nullptr);
-    put(rays.position, range.begin(), batch.position);
-    put(rays.direction, range.begin(), batch.direction);
-    if (!rays.differentials.empty()) put(rays.differentials, range.begin(), batch.differentials);
-    put(rays.end, range.begin(), batch.end);
-    put(rays.length, range.begin(), batch.length);
-    put(rays.steps, range.begin(), batch.steps);
-    for (std::size_t i = 0; i < records.size(); ++i) traced.ways[range.begin() + i] = way(field, records[i]);
+    trace(field, geometry, bending, batches[i].rays, with_ways ? &records : nullptr);
+    for (const RayRecord& record : records) batches[i].ways.push_back(way(field, record));
   });
+}
+
+/// The values of a member of all batches.
+template <class T>
+std::vector<T> joined_values(const std::vector<TracedBatch>& batches, std::vector<T> RayBatch::*member) {
+  std::vector<T> all;
+  for (const TracedBatch& batch : batches)
+    all.insert(all.end(), (batch.rays.*member).begin(), (batch.rays.*member).end());
+  return all;
 }
 
 py::array ends_array(std::vector<RayEnd> ends, const Shape& shape) {
@@ -131,39 +116,36 @@ py::array ends_array(std::vector<RayEnd> ends, const Shape& shape) {
   return taken(std::move(numbers), shape);
 }
 
-py::dict arrays_of(Traced traced) {
-  RayBatch& rays = traced.rays;
-  const auto count = static_cast<py::ssize_t>(rays.size());
+py::dict arrays_of(std::vector<TracedBatch> batches, py::ssize_t count) {
   py::dict arrays;
-  if (!rays.differentials.empty()) {
+  const std::vector<RayDifferential> differentials = joined_values(batches, &RayBatch::differentials);
+  if (!differentials.empty()) {
     std::vector<Eigen::Matrix<double, 3, 2>> positions, directions;
-    for (const RayDifferential& differential : rays.differentials) {
+    for (const RayDifferential& differential : differentials) {
       positions.push_back(differential.position);
       directions.push_back(differential.direction);
     }
     arrays["position_jacobians"] = taken_matrices(std::move(positions), {count, 2, 3}).attr("swapaxes")(1, 2);
     arrays["direction_jacobians"] = taken_matrices(std::move(directions), {count, 2, 3}).attr("swapaxes")(1, 2);
   }
-  if (!traced.ways.empty()) {
-    py::list ways;
-    for (std::vector<Eigen::Vector3d>& way : traced.ways) {
+  py::list ways;
+  for (TracedBatch& batch : batches)
+    for (std::vector<Eigen::Vector3d>& way : batch.ways) {
       const auto points = static_cast<py::ssize_t>(way.size());
       ways.append(taken_matrices(std::move(way), {points, 3}));
     }
-    arrays["ways"] = ways;
-  }
-  arrays["positions"] = taken_matrices(std::move(rays.position), {count, 3});
-  arrays["directions"] = taken_matrices(std::move(rays.direction), {count, 3});
-  arrays["lengths"] = taken(std::move(rays.length), {count});
-  arrays["steps"] = taken(std::move(rays.steps), {count});
-  arrays["ends"] = ends_array(std::move(rays.end), {count});
+  if (!ways.empty()) arrays["ways"] = ways;
+  arrays["positions"] = taken_matrices(joined_values(batches, &RayBatch::position), {count, 3});
+  arrays["directions"] = taken_matrices(joined_values(batches, &RayBatch::direction), {count, 3});
+  arrays["lengths"] = taken(joined_values(batches, &RayBatch::length), {count});
+  arrays["steps"] = taken(joined_values(batches, &RayBatch::steps), {count});
+  arrays["ends"] = ends_array(joined_values(batches, &RayBatch::end), {count});
   return arrays;
 }
 
 py::dict trace_for_python(const Field& field, const TraceRequest& request, int threads, const py::object& report) {
   check(request);
-  Traced traced;
-  traced.rays = batch_of(request);
+  std::vector<TracedBatch> batches = batches_of(request);
   BendingSettings bending = request.bending;
   bending.method = value_of<BendingMethod>("method", request.method);
   const bool extends = value_of<BorderChoice>("border", request.border) == BorderChoice::extend;
@@ -179,10 +161,10 @@ py::dict trace_for_python(const Field& field, const TraceRequest& request, int t
         surfaces.bounds = box_mesh(bricks.index_bounds(), bricks.to_world());
         surfaces.plate = request.plate;
         progress.update("tracing", 0, 1);
-        trace_all(bricks, Geometry(std::move(surfaces)), bending, request.paths, traced, progress);
+        trace_all(bricks, Geometry(std::move(surfaces)), bending, request.paths, batches, progress);
       },
       report, threads);
-  return arrays_of(std::move(traced));
+  return arrays_of(std::move(batches), request.flexibilities.size());
 }
 
 Plate plate_of(const Doubles& center, const Doubles& normal, const Doubles& up, const Doubles& size) {

@@ -92,13 +92,13 @@ std::string choose(const std::string& wanted, const std::string& fallback, const
   throw std::runtime_error(what + " has no " + in_quotes(name) + "; known: " + (list.empty() ? "none" : list));
 }
 
-std::vector<std::string> displays(const OCIO::Config& config) {
+std::vector<std::string> displays_in(const OCIO::Config& config) {
   std::vector<std::string> names;
   for (int i = 0; i < config.getNumDisplays(); ++i) names.emplace_back(config.getDisplay(i));
   return names;
 }
 
-std::vector<std::string> views(const OCIO::Config& config, const std::string& display) {
+std::vector<std::string> views_in(const OCIO::Config& config, const std::string& display) {
   std::vector<std::string> names;
   for (int i = 0; i < config.getNumViews(display.c_str()); ++i) names.emplace_back(config.getView(display.c_str(), i));
   return names;
@@ -246,8 +246,9 @@ ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::ma
     if (!config->hasRole(OCIO::ROLE_SCENE_LINEAR))
       throw std::runtime_error("no role scene_linear; give it to the config's linear working space");
     state_->working_space = config->getColorSpace(OCIO::ROLE_SCENE_LINEAR)->getName();
-    state_->display = choose(settings.display, config->getDefaultDisplay(), displays(*config), "the list of displays");
-    const std::vector<std::string> known = views(*config, state_->display);
+    state_->display =
+        choose(settings.display, config->getDefaultDisplay(), displays_in(*config), "the list of displays");
+    const std::vector<std::string> known = views_in(*config, state_->display);
     const bool prefers = std::find(known.begin(), known.end(), settings.preferred_view) != known.end();
     const std::string usual = prefers ? settings.preferred_view : config->getDefaultView(state_->display.c_str());
     state_->view = choose(settings.view, usual, known, "display " + in_quotes(state_->display));
@@ -349,5 +350,7 @@ std::string ColorManagement::config_name() const { return state_->config_name; }
 std::string ColorManagement::working_space() const { return state_->working_space; }
 std::string ColorManagement::display() const { return state_->display; }
 std::string ColorManagement::view() const { return state_->view; }
+std::vector<std::string> ColorManagement::displays() const { return displays_in(*state_->config); }
+std::vector<std::string> ColorManagement::views() const { return views_in(*state_->config, state_->display); }
 
 }  // namespace tensorray

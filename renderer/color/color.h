@@ -101,6 +101,8 @@ class ColorManagement {
   std::string working_space() const;  ///< The name of the scene_linear space.
   std::string display() const;
   std::string view() const;
+  std::vector<std::string> displays() const;  ///< All of the config.
+  std::vector<std::string> views() const;     ///< All of the display.
 
  private:
   struct State;

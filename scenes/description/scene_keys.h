@@ -50,21 +50,23 @@ void describe(FieldDescription& field, Visitor& visit) {
   visit("smooth", field.smooth, "standard deviation of a Gaussian that smooths the field first, voxels; 0 is none",
         between(0, greatest_smoothing));
   visit("eigenvalues", field.eigenvalues,
-        "raw: as they are; absolute: |T|; positive: (T^2)^(1/2); auto: absolute if the field is symmetric, else raw");
+        "raw: as they are; absolute: |T|; positive: (T^2)^(1/2); auto: absolute if the field is symmetric, else raw",
+        knob());
   visit("interpolation", field.interpolation, "what the field is between its voxels: smooth (cubic), or linear");
   visit("border", field.border,
         "cubic: inactive voxels fade to zero, or extend the values of active ones; auto extends where obstacles or "
         "bounds are given");
   visit("scale", field.scale,
         "factor on the flexibility; auto: the scale that shows the field's structure without tangling the light",
-        not_zero().or_word("auto"));
+        not_zero().or_word("auto").as_knob());
   visit("bounds", field.bounds, "closed mesh that limits the volume; light is straight outside it");
 }
 
 template <class Visitor>
 void describe(BendingDescription& bending, Visitor& visit) {
-  visit("a", bending.flexibility.a, "constant part of the flexibility of light, s = a + b * wavelength");
-  visit("b", bending.flexibility.b, "slope of the flexibility of light, s = a + b * wavelength, per nm");
+  visit("a", bending.flexibility.a, "constant part of the flexibility of light, s = a + b * wavelength", knob(-2, 2));
+  visit("b", bending.flexibility.b, "slope of the flexibility of light, s = a + b * wavelength, per nm",
+        knob(-0.004, 0.004));
   visit("rgb", bending.rgb, "three flexibilities, one for each colour channel, instead of wavelengths");
   visit("method", bending.settings.method,
         "how rays are integrated; auto is splitting4 between cubic voxels, splitting between linear ones; all but "
@@ -90,9 +92,9 @@ struct WavelengthKeys {
 template <class Visitor>
 void describe(WavelengthKeys& keys, Visitor& visit) {
   LightDescription& light = keys.light;
-  visit("min", light.wavelength_min, "shortest wavelength, nm", between(observer_min, observer_max));
-  visit("max", light.wavelength_max, "longest wavelength, nm", between(observer_min, observer_max));
-  visit("count", light.wavelength_count, "number of bands between the two", between(1, 1000));
+  visit("min", light.wavelength_min, "shortest wavelength, nm", between(observer_min, observer_max).as_knob());
+  visit("max", light.wavelength_max, "longest wavelength, nm", between(observer_min, observer_max).as_knob());
+  visit("count", light.wavelength_count, "number of bands between the two", between(1, 1000).as_knob(1, 128));
   visit("per_photon", light.wavelengths_per_photon, "bands that each photon carries; a divisor of count",
         between(1, 1000).or_word("all"));
 }
@@ -102,12 +104,13 @@ void describe(LightDescription& light, Visitor& visit) {
   visit("direction", light.direction,
         "direction in which light travels, of any length; auto: of the six axis directions, the one in which light "
         "shows most of the field",
-        not_zero().or_word("auto"));
+        not_zero().or_word("auto").as_knob());
   visit("up", light.up, "up axis of aperture and receiver; default: +z, or +y for light along z", not_zero());
-  visit("photons", light.photons, "approximate number of positions that emit", between(1, 1e12));
+  visit("photons", light.photons, "approximate number of positions that emit", between(1, 1e12).as_knob(1e3, 4e6));
   visit("pattern", light.pattern, "pattern of these positions on the aperture");
   visit("spectrum", light.spectrum,
-        "an illuminant (D65, E, A), \"blackbody KELVIN\", or a text file with columns wavelength (nm) and value");
+        "an illuminant (D65, E, A), \"blackbody KELVIN\", or a text file with columns wavelength (nm) and value",
+        knob().with_examples({"D65", "E", "A", "blackbody 3000", "blackbody 5500", "blackbody 9000"}));
   visit.section("wavelengths", WavelengthKeys{light}, "the bands of light that are traced");
   visit("irradiance", light.irradiance, "irradiance of the undisturbed beam, W per world unit squared", above(0));
   visit.section("aperture", light.aperture, "a rectangle that light comes from, instead of the volume's silhouette");
@@ -117,11 +120,12 @@ template <class Visitor>
 void describe(ReceiverDescription& receiver, Visitor& visit) {
   visit.exclude("center", {"distance"});
   visit("distance", receiver.distance,
-        "distance of the plate behind the volume, along the light; default: 1/4 of its depth", at_least(0));
+        "distance of the plate behind the volume, along the light; default: 1/4 of its depth", at_least(0).as_knob());
   visit("center", receiver.center, "middle of the plate, world");
-  visit("normal", receiver.normal, "normal of the plate; default: opposite to the light", not_zero());
+  visit("normal", receiver.normal, "normal of the plate; default: opposite to the light", not_zero().as_knob());
   visit("up", receiver.up, "up axis of the plate; default: that of the light", not_zero());
-  visit("size", receiver.size, "width and height, world units; default: 1.25 times the extent of the beam", above(0));
+  visit("size", receiver.size, "width and height, world units; default: 1.25 times the extent of the beam",
+        above(0).as_knob());
   visit("resolution", receiver.resolution, "pixels, width and height; default: 512 along the longer side",
         between(1, 32768).or_one_for_all());
 }
@@ -201,7 +205,7 @@ void describe(ObjectDescription& object, Visitor& visit) {
 template <class Visitor>
 void describe(IntegratorDescription& integrator, Visitor& visit) {
   visit.require({"type"});
-  visit("type", integrator.type, "the method");
+  visit("type", integrator.type, "the method", knob());
   for (const auto& method : integrator.methods) visit.part(*method);
 }
 
@@ -213,13 +217,13 @@ void describe(OutputDescription& output, Visitor& visit) {
     if (!file.empty()) output.files[kind.key] = file;
   }
   visit("fluence_bands", output.fluence_bands, "write a further grid to `fluence` for each band of wavelengths");
-  visit("exposure", output.exposure, "exposure of `image`, stops", between(-100, 100).or_word("auto"));
+  visit("exposure", output.exposure, "exposure of `image`, stops", between(-100, 100).or_word("auto").as_knob(-8, 8));
   visit("white_balance", output.white_balance, "adapt the light's white to the working space's");
   visit("ocio", output.ocio,
         "OpenColorIO config: a file, ocio://NAME, or built-in; default: $OCIO, or the built-in one");
-  visit("display", output.display, "OpenColorIO display; default: that of the config");
+  visit("display", output.display, "OpenColorIO display; default: that of the config", knob());
   visit("view", output.view,
-        "OpenColorIO view; default: Soft highlights for light on a plate, otherwise that of the display");
+        "OpenColorIO view; default: Soft highlights for light on a plate, otherwise that of the display", knob());
   visit("annotations", output.annotations, "what is drawn over `image`: a scale bar, the world's axes, a legend");
   visit("caption", output.caption, "a line over `image`; {field.scale} is the value of a key, # counts frames");
 }
@@ -246,7 +250,7 @@ void describe(SceneDescription& scene, Visitor& visit) {
   visit.section("light", scene.light, "parallel light through the volume");
   visit.list("obstacles", scene.obstacles, "surfaces that absorb light",
              [](std::filesystem::path& file) { return ObstacleKeys{file}; });
-  visit.section("receiver", scene.receiver, "the plate that collects light");
+  visit.section("receiver", scene.receiver, "photon_distribution, lens, path_tracing: the plate that collects light");
   visit.section("integrator", scene.integrator, "the method");
   visit.section("camera", scene.camera, "path_tracing, scene: the camera");
   visit.list("lights", scene.lights,

@@ -9,7 +9,7 @@
 
 namespace tensorray {
 
-/// Limits of one key. Limits that do not apply to the type of the key are ignored.
+/// Limits of one key, and how a form shows it. Limits that do not apply to the type of the key are ignored.
 struct Limits {
   double minimum = -std::numeric_limits<double>::infinity();  ///< Least value of a number, or of each number of a list.
   double maximum = std::numeric_limits<double>::infinity();
@@ -19,6 +19,12 @@ struct Limits {
   const char* word = nullptr;  ///< A string that is also allowed, for example "auto"; it is read as 0 or no value.
   std::vector<std::string> endings{};  ///< Allowed endings of a file name; empty: any.
 
+  /// Whether the live view shows the key among its knobs, with a slider for a number. Its ends: `from` and `to`; those
+  /// of the limits, if the two are equal; about the value that the render has chosen, if there are no such limits.
+  bool is_knob = false;
+  double from = 0, to = 0;
+  std::vector<std::string> examples{};  ///< Of a text that may be any.
+
   Limits or_word(const char* allowed) && {
     word = allowed;
     return std::move(*this);
@@ -27,7 +33,19 @@ struct Limits {
     one_for_all = true;
     return std::move(*this);
   }
+  Limits as_knob(double slider_from = 0, double slider_to = 0) && {
+    is_knob = true;
+    from = slider_from;
+    to = slider_to;
+    return std::move(*this);
+  }
+  Limits with_examples(std::vector<std::string> texts) && {
+    examples = std::move(texts);
+    return std::move(*this);
+  }
 };
+
+inline Limits knob(double from = 0, double to = 0) { return Limits().as_knob(from, to); }
 
 inline Limits at_least(double minimum) {
   Limits limits;

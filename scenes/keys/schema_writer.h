@@ -26,6 +26,8 @@ class SchemaWriter {
     }
     const Json standard = limits.word && is_word(member) ? Json(limits.word) : Value<T>::json(member);
     if (!standard.is_null() && !is_required(key)) schema["default"] = standard;
+    if (!limits.examples.empty()) schema["examples"] = limits.examples;
+    if (limits.is_knob) schema["knob"] = limits.from < limits.to ? Json{limits.from, limits.to} : Json(true);
     properties_[key] = schema;
   }
 

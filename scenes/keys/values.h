@@ -185,7 +185,11 @@ struct Value<std::variant<Enum, std::filesystem::path>, std::enable_if_t<std::is
     return fmt::format("one of {}, or a file (NAME.png)", quoted_choices<Enum>());
   }
 
-  static Json schema(const Variant&, const Limits& limits) { return Value<std::filesystem::path>::schema({}, limits); }
+  static Json schema(const Variant&, const Limits& limits) {
+    Json schema = Value<std::filesystem::path>::schema({}, limits);
+    for (const auto& choice : choices(Enum{})) schema["examples"].push_back(choice.name);
+    return schema;
+  }
 
   static Json json(const Variant& value) {
     const Enum* word = std::get_if<Enum>(&value);

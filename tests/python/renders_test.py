@@ -61,9 +61,6 @@ class RendersTest(unittest.TestCase):
         for scene in OTHERS.values():
             self.same_files(scene, [".png", ".exr"])
 
-    def test_a_picture_alone_has_the_same_bytes(self):
-        self.same_files(PHOTONS, [".png"])
-
     def test_a_field_object_gives_the_bytes_of_its_file(self):
         self.assertEqual(command_line(self.folder, "make", "vortex", "-o", "f.vdb", "--resolution", "16").returncode, 0)
         file = self.path("f.vdb")

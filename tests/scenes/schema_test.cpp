@@ -140,6 +140,20 @@ TEST(Schema, TheReaderAcceptsEveryDefault) {
   }
 }
 
+/// The ends of the sliders of the live view are values of their keys.
+TEST(Schema, TheReaderAcceptsTheEndsOfEverySlider) {
+  int checked = 0;
+  for (const Leaf& leaf : leaves()) {
+    if (!leaf.schema.contains("knob") || !leaf.schema.at("knob").is_array()) continue;
+    for (const Json& end : leaf.schema.at("knob")) {
+      const Json value = leaf.schema.value("type", "") == "integer" ? Json(end.get<std::int64_t>()) : end;
+      EXPECT_EQ(refusal(leaf, value), "") << leaf.pointer.to_string();
+    }
+    ++checked;
+  }
+  EXPECT_GE(checked, 6);
+}
+
 TEST(Schema, TheReaderKnowsEveryWordAndNoOther) {
   int checked = 0;
   for (const Leaf& leaf : leaves()) {

@@ -48,7 +48,7 @@ TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
   EXPECT_EQ(pictures.front().at("stage"), 0);
   EXPECT_LT(pictures.front().at("width"), 64);
   EXPECT_EQ(last.json.at("width"), 64);
-  EXPECT_EQ(last.json.at("scale"), 4);
+  EXPECT_EQ(last.json.at("/chosen/field/scale"_json_pointer), 4);
 
   LiveScene anew(scene_file());
   anew.load(test::small_scene(), {in_folder("p.png"), in_folder("p.exr")}, progress_);
@@ -80,7 +80,7 @@ TEST_F(PagesTest, TheNewestSceneWins) {
     pages_.receive(page, Json{{"type", "scene"}, {"id", id}, {"scene", scene}}.dump());
   }
   all_sent.set_value();
-  EXPECT_NEAR(other_mailbox_.final_picture(40).json.at("scale"), 4.4, 1e-9);
+  EXPECT_NEAR(other_mailbox_.final_picture(40).json.at("/chosen/field/scale"_json_pointer).get<double>(), 4.4, 1e-9);
   std::set<int> shown;
   for (const test::Received& message : other_mailbox_.all())
     if (message.json.at("type") == "picture") shown.insert(message.json.at("id").get<int>());
@@ -156,23 +156,9 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
     const std::string text = mailbox_.wait("error", id).json.at("message");
     EXPECT_EQ(text.find('\n'), std::string::npos);
   }
-  const std::vector<std::string> wrong{"",
-                                       "{",
-                                       "[]",
-                                       "null",
-                                       "17",
-                                       "{}",
-                                       R"({"type":1})",
-                                       R"({"type":"shutdown"})",
-                                       R"({"type":"scene"})",
-                                       R"({"type":"scene","scene":[]})",
-                                       R"({"type":"look"})",
-                                       R"({"type":"look","x":"a","y":1})",
-                                       R"({"type":"export","file":7})",
-                                       R"({"type":"export","file":"../x"})",
-                                       R"({"type":"space"})",
-                                       std::string(100000, '['),
-                                       std::string("\0\xff\xfe", 3)};
+  // The fuzzer `page` sends others.
+  const std::vector<std::string> wrong{"{", R"({"type":"shutdown"})", R"({"type":"scene","scene":[]})",
+                                       R"({"type":"export","file":"../x"})", std::string(100000, '[')};
   for (const std::string& text : wrong) pages_.receive(page_, text);
   for (int i = 0; i < 1000; ++i) send({{"type", "look"}, {"id", 1000 + i}, {"x", 1e308}, {"y", -1e308}});
   send_scene(20, test::small_scene());
@@ -182,22 +168,7 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
   EXPECT_GE(errors, 4 + wrong.size());
 }
 
-/// A page that comes after a scene could not be loaded sees the one before.
-TEST_F(PagesTest, ANewPageAfterAFailureSeesTheSceneBefore) {
-  Json scene = test::small_scene();
-  send_scene(1, scene);
-  mailbox_.final_picture(1);
-  scene["field"]["generate"] = {
-      {"kind", "constant"}, {"resolution", 12}, {"tensor", {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}}};
-  scene["field"]["scale"] = "auto";  // There is none for a field of zeros.
-  send_scene(2, scene);
-  mailbox_.wait([](const Json& json) { return json.value("id", Json()) == 2; });
-  pages_.open(other_mailbox_.sender());
-  const Json hello = other_mailbox_.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
-  EXPECT_EQ(hello.at("field").at("voxels")[0], 12);
-}
-
-/// Also a page that comes while another one looks at another field.
+/// A page that comes while another one looks at another field.
 TEST_F(PagesTest, AllPagesBeginWithTheSameField) {
   Json scene = test::small_scene();
   scene["field"]["generate"]["resolution"] = 7;

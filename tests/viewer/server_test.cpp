@@ -27,6 +27,8 @@ using Socket = beast::websocket::stream<tcp::socket>;
 
 class ServerTest : public test::ViewTest {
  protected:
+  static constexpr std::size_t waiting_bytes = 1 << 20;
+
   ServerTest() {
     for (const char* file : {"index.html", "view.js", "view.css"})
       std::ofstream(in_folder(file)) << "content of " << file;
@@ -34,6 +36,7 @@ class ServerTest : public test::ViewTest {
     settings.token = token_;
     settings.page = in_folder("");
     settings.hosts = {"workstation"};
+    settings.most_waiting_bytes = waiting_bytes;
     pages_.emplace(viewed(), progress_);
     server_.emplace(settings, *pages_);
     const std::string url = server_->url();
@@ -135,39 +138,22 @@ TEST_F(ServerTest, ServesItsFilesAndNoOthers) {
 
 /// What people and programs make of the address that was printed.
 TEST_F(ServerTest, AnswersWhatIsMeant) {
-  struct Case {
-    http::verb verb;
-    std::string target;
-    unsigned status;
-    std::string body;
-  };
-  const std::string index = "content of index.html";
-  const std::string bare = "/" + token_;
-  for (const Case& each : {Case{http::verb::get, path("?utm_source=chat"), 200, index},
-                           Case{http::verb::get, path("view.js?v=2"), 200, "content of view.js"},
-                           Case{http::verb::get, path("?a=/b/"), 200, index}, Case{http::verb::head, path(""), 200, ""},
-                           Case{http::verb::head, path("none"), 404, ""}, Case{http::verb::get, bare, 308, ""},
-                           Case{http::verb::get, bare + "?x", 308, ""}, Case{http::verb::head, bare, 308, ""},
-                           Case{http::verb::post, path("?x"), 405, "only GET and HEAD are answered\n"}}) {
-    const auto response = get(each.target, own_host(), each.verb);
-    EXPECT_EQ(response.result_int(), each.status) << each.target;
-    EXPECT_EQ(response.body(), each.body) << each.target;
-    if (each.status == 308) {
-      EXPECT_EQ(response[http::field::location], path(""));
-    }
-    if (each.status == 200) {
-      EXPECT_EQ(response[http::field::content_length], std::to_string(get(each.target, own_host()).body().size()));
-    }
-  }
+  EXPECT_EQ(get(path("?utm_source=/chat/"), own_host()).body(), "content of index.html");
+  EXPECT_EQ(get(path("view.js?v=2"), own_host()).body(), "content of view.js");
+  const auto head = get(path(""), own_host(), http::verb::head);
+  EXPECT_EQ(head.result_int(), 200u);
+  EXPECT_EQ(head[http::field::content_length], std::to_string(std::string("content of index.html").size()));
+  const auto bare = get("/" + token_ + "?x", own_host());
+  EXPECT_EQ(bare.result_int(), 308u);
+  EXPECT_EQ(bare[http::field::location], path(""));
 }
 
 /// A picture may be larger than what a page may have waiting.
 TEST_F(ServerTest, SendsAFileOfAnySize) {
   Json scene = test::small_scene();
-  scene["receiver"]["resolution"] = {1720, 1720};  // Of 14 channels, of which some compress well.
+  scene["receiver"]["resolution"] = {400, 400};  // Of 14 channels, of which some compress well.
   scene["light"]["photons"] = 2000;
   Socket socket = open_socket();
-  socket.read_message_max(std::size_t{1} << 30);
   EXPECT_EQ(read_json(socket).at("type"), "hello");
   socket.write(asio::buffer(Json{{"type", "scene"}, {"id", 1}, {"scene", scene}}.dump()));
   for (Json json = Json::object(); !json.value("final", false);) json = read_json(socket);
@@ -180,10 +166,12 @@ TEST_F(ServerTest, SendsAFileOfAnySize) {
   while (answers["file"] < 1 || answers["look"] < looks) {
     const Json json = read_json(socket);
     ++answers[json.value("type", "")];
+    if (json.value("type", "") == "file") {
+      EXPECT_GT(read_bytes_, waiting_bytes);
+    }
     EXPECT_EQ(json.value("name", "scene.exr"), "scene.exr");
     ASSERT_NE(json.value("type", ""), "error") << json;
   }
-  EXPECT_GT(read_bytes_, Server::most_waiting_bytes);
 }
 
 TEST_F(ServerTest, RefusesAWrongToken) {
@@ -209,27 +197,18 @@ TEST_F(ServerTest, RefusesForeignHostAndOrigin) {
 }
 
 TEST_F(ServerTest, SurvivesHostileBytes) {
+  // The fuzzer `http` sends others.
   EXPECT_EQ(exchange("nonsense\r\n\r\n").substr(0, 12), "HTTP/1.1 400");
-  exchange("GET /" + std::string(100000, 'a') + " HTTP/1.1\r\n\r\n");
   exchange("GET / HTTP/1.1\r\nHost: " + std::string(100000, 'b') + "\r\n\r\n");
-  exchange("POST " + path("") + " HTTP/1.1\r\nHost: " + own_host() + "\r\nContent-Length: 99999999999\r\n\r\n");
-  exchange(std::string(1000, '\0'));
-  {
-    Socket socket = open_socket();
-    socket.write(asio::buffer(std::string(Server::most_message_bytes + 1, ' ')));
-    EXPECT_THROW(
-        {
-          for (;;) read_json(socket);
-        },
-        boost::system::system_error);
-  }
-  {
-    Socket socket = open_socket();
-    for (const std::string& text : {std::string("{"), std::string(100000, '['), std::string("\"\0\"", 3)})
-      socket.write(asio::buffer(text));
-    socket.binary(true);
-    socket.write(asio::buffer(std::string("\xff\xfe\xfd")));
-  }
+  Socket socket = open_socket();
+  socket.binary(true);
+  socket.write(asio::buffer(std::string("\xff\xfe\xfd")));
+  socket.write(asio::buffer(std::string(Server::most_message_bytes + 1, ' ')));
+  EXPECT_THROW(
+      {
+        for (;;) read_json(socket);
+      },
+      boost::system::system_error);
   expect_alive();
 }
 

@@ -65,7 +65,7 @@ void change_scale(benchmark::State& state, const std::string& file, bool finishe
   Pages pages(viewed, progress);
   TimedPage page(pages);
   Json scene = scene_json(viewed.file, viewed.overrides);
-  const double scale = page.picture_of(scene, true).at("scale");
+  const double scale = page.picture_of(scene, true).at("/chosen/field/scale"_json_pointer);
   int change = 0;
   for (auto _ : state) {
     scene["field"]["scale"] = scale * (1 + 0.01 * ++change);

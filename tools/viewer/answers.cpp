@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/text/text.h"
+#include "scenes/outputs/picture_outputs.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
@@ -157,16 +158,30 @@ Json spectrum_at(const Render& render, const Vector2d& place) {
 Json describe_field(const Scene& scene) {
   const Eigen::AlignedBox3d& voxels = scene.field.voxels();
   const Vector3d counts = voxels.sizes() + Vector3d::Ones();
-  const Eigen::AlignedBox3d& bounds = scene.field.index_bounds();
   Json corners = Json::array();
-  for (int i = 0; i < 8; ++i) {
-    const Vector3d corner((i & 1 ? bounds.max() : bounds.min()).x(), (i & 2 ? bounds.max() : bounds.min()).y(),
-                          (i & 4 ? bounds.max() : bounds.min()).z());
-    corners.push_back(to_json(scene.field.to_world() * corner));
-  }
+  for (const Vector3d& corner : scene.field.corners()) corners.push_back(to_json(corner));
   Json size = Json::array();
   for (int i = 0; i < 3; ++i) size.push_back(static_cast<int>(std::lround(counts[i])));
   return {{"voxels", std::move(size)}, {"corners", std::move(corners)}};
+}
+
+Json describe_choices(const Scene& scene, const Render& render) {
+  const Plate& plate = *scene.geometry.surfaces().plate;
+  double far = -std::numeric_limits<double>::infinity();
+  for (const Vector3d& corner : scene.field.corners()) far = std::max(far, corner.dot(scene.beam.direction));
+  Json receiver = {{"normal", to_json(plate.normal())}, {"size", {plate.size.x(), plate.size.y()}}};
+  if (!scene.description.receiver.center) receiver["distance"] = plate.center.dot(scene.beam.direction) - far;
+  return {{"field", {{"scale", scene.scale.scale}}},
+          {"light", {{"direction", to_json(scene.beam.direction)}}},
+          {"receiver", std::move(receiver)},
+          {"output",
+           {{"exposure", display_exposure(scene, render)},
+            {"display", scene.color.display()},
+            {"view", scene.color.view()}}}};
+}
+
+Json describe_examples(const Scene& scene) {
+  return {{"output", {{"display", scene.color.displays()}, {"view", scene.color.views()}}}};
 }
 
 Json describe_space(const Scene& scene, bool with_meshes) {

@@ -17,6 +17,12 @@ namespace tensorray {
 /// The volume of a scene: `voxels` and `corners`.
 Json describe_field(const Scene& scene);
 
+/// What was used where a scene may leave it open, as a part of a scene: scale, direction of light, plate, colours.
+Json describe_choices(const Scene& scene, const Render& render);
+
+/// Names that keys may have in this scene, in the place of their values.
+Json describe_examples(const Scene& scene);
+
 /// Positions, rays and surfaces in the world: `plate`, `beam`, `rays`, `meshes`, `camera`.
 /// @param with_meshes  Otherwise `meshes` is null: the page keeps those that it has.
 Json describe_space(const Scene& scene, bool with_meshes);

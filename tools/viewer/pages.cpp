@@ -338,9 +338,8 @@ void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading)
                     {"format", stage.is_final() ? "image/png" : "image/jpeg"},
                     {"seconds", seconds},
                     {"phases", phases},
-                    {"scale", scene.scale.scale},
-                    {"exposure", display_exposure(scene, render)},
-                    {"direction", {scene.beam.direction.x(), scene.beam.direction.y(), scene.beam.direction.z()}},
+                    {"chosen", describe_choices(scene, render)},
+                    {"examples", describe_examples(scene)},
                     {"notes", scene.notes},
                     {"warnings", render.warnings}};
   page.send(binary_message(header, bytes_of(file), true));

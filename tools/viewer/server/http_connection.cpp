@@ -1,12 +1,10 @@
-#include "tools/viewer/server/http_connection.h"
-
 #include <chrono>
 #include <memory>
 #include <utility>
 
 #include <boost/beast/websocket.hpp>
 
-#include "tools/viewer/server/page_socket.h"
+#include "tools/viewer/server/server_state.h"
 
 namespace tensorray {
 namespace {

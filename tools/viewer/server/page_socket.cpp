@@ -1,5 +1,3 @@
-#include "tools/viewer/server/page_socket.h"
-
 #include <algorithm>
 #include <deque>
 #include <memory>
@@ -7,6 +5,8 @@
 
 #include <boost/asio/post.hpp>
 #include <boost/beast/websocket.hpp>
+
+#include "tools/viewer/server/server_state.h"
 
 namespace tensorray {
 namespace {
@@ -73,7 +73,7 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
   bool waits_for_too_much() const {
     std::size_t largest = 0;
     for (const PageMessage& message : queue_) largest = std::max(largest, message.data.size());
-    return waiting_bytes_ - largest > Server::most_waiting_bytes;
+    return waiting_bytes_ - largest > state_->settings.most_waiting_bytes;
   }
 
   void write() {

@@ -11,7 +11,6 @@
 #include <fmt/format.h>
 
 #include "base/text/text.h"
-#include "tools/viewer/server/http_connection.h"
 #include "tools/viewer/server/server_state.h"
 
 namespace tensorray {

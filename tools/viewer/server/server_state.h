@@ -65,4 +65,13 @@ class Counted {
   std::size_t& count_;
 };
 
+/// Reads one request of a browser and answers it: with a file of the page, or the beginning of a WebSocket. The
+/// connection keeps itself alive while it has something to do. In http_connection.cpp.
+void serve_connection(const std::shared_ptr<Server::State>& state, tcp::socket socket);
+
+/// Accepts the WebSocket of a page, opens the page, and passes messages between them until one of the two ends. In
+/// page_socket.cpp.
+void open_page_socket(const std::shared_ptr<Server::State>& state, beast::tcp_stream stream,
+                      const HttpRequest& request);
+
 }  // namespace tensorray

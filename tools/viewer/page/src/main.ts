@@ -2,8 +2,8 @@
 
 import "./view.css";
 import "uplot/dist/uPlot.min.css";
-import { Knobs } from "./controls/knobs";
-import { SchemaForm } from "./controls/schema_form";
+import { DirectionSphere } from "./controls/direction_sphere";
+import { Form } from "./controls/form";
 import { by_id } from "./elements/dom";
 import { copy, download } from "./elements/files";
 import { make_tabs } from "./elements/tabs";
@@ -17,7 +17,7 @@ import { fragment_of, patch_of } from "./state/address";
 import { command_line } from "./state/command_line";
 import { Connection } from "./state/connection";
 import { apply_patch, type JsonObject } from "./state/json";
-import type { BinaryMessage, Failure, FieldInformation, Hello, PictureHeader, TextMessage } from "./state/protocol";
+import type { BinaryMessage, Failure, FieldInformation, Hello, PictureHeader, Request, TextMessage } from "./state/protocol";
 import { State } from "./state/state";
 import { Throttle } from "./state/throttle";
 
@@ -29,33 +29,30 @@ const theme = new Theme(by_id<HTMLButtonElement>("theme"));
 const picture = new Picture(by_id<HTMLCanvasElement>("picture"), by_id("picture-frame"), by_id("cross-hair"));
 const read_out = new ReadOut(by_id("read-out"));
 const status_line = new StatusLine();
-const knobs = new Knobs(by_id("knobs"), state);
-const form = new SchemaForm(by_id("all-keys"), state);
+const form = new Form(by_id("keys"), state);
 const space_pane = make_space_pane();
 
 let hello: Hello | null = null;
 let shown_field = "";
 let sent_scene: JsonObject | null = null;
 /** Ids of requests whose errors are told to the user. */
-const told_ids = new Set<number>();
+const told_ids = new Set<number | null>();
 
 const connection = new Connection({ on_text, on_binary, on_state: on_connection });
 
 const scenes = new Throttle<JsonObject>((scene) => {
-  const id = connection.next_id();
-  if (!connection.send({ type: "scene", id, scene })) return null;
-  sent_scene = scene;
-  told_ids.add(id);
+  const id = ask_and_tell({ type: "scene", scene });
+  if (id !== null) sent_scene = scene;
   return id;
 });
-const looks = new Throttle<[number, number]>(([x, y]) => {
-  const id = connection.next_id();
-  return connection.send({ type: "look", id, x, y }) ? id : null;
-});
-const spaces = new Throttle<true>(() => {
-  const id = connection.next_id();
-  return connection.send({ type: "space", id }) ? id : null;
-});
+const looks = new Throttle<[number, number]>(([x, y]) => connection.send({ type: "look", x, y }));
+const spaces = new Throttle<true>(() => connection.send({ type: "space" }));
+
+function ask_and_tell(request: Request): number | null {
+  const id = connection.send(request);
+  told_ids.add(id);
+  return id;
+}
 
 function make_space_pane(): SpacePane | null {
   try {
@@ -128,7 +125,6 @@ function on_hello(message: Hello): void {
     scenes.ask(state.scene);
     return;
   }
-  knobs.build(message.schema);
   form.build(message.schema);
   const patch = patch_of(location.hash);
   if (location.hash.length > 1 && !patch) show_toast("The address has no readable scene. The scene of the file is shown.");
@@ -140,14 +136,16 @@ function on_field(field: FieldInformation): void {
   if (JSON.stringify(field) === shown_field) return;
   shown_field = JSON.stringify(field);
   space_pane?.show_field(field);
-  knobs.show_field(field);
 }
 
 function on_picture(header: PictureHeader, content: Uint8Array<ArrayBuffer>): void {
   scenes.answered(header.id);
   by_id("picture-waiting").hidden = true;
   status_line.show_picture(header);
-  knobs.show_picture(header);
+  form.show_fault(null);
+  state.chosen = header.chosen;
+  state.examples = header.examples;
+  form.update();
   void picture.draw(header, content).catch(() => status_line.show_error("The picture cannot be decoded."));
   by_id<HTMLButtonElement>("export-png").disabled = !header.final;
   by_id<HTMLButtonElement>("export-exr").disabled = !header.final;
@@ -167,6 +165,7 @@ function on_error(failure: Failure): void {
     space_pane?.show_look([]);
   } else if (told_ids.has(failure.id)) {
     status_line.show_error(failure.message);
+    form.show_fault(failure.message);
   }
   for (const queue of [scenes, looks, spaces]) if (queue.is_outstanding(failure.id)) queue.answered(failure.id);
 }
@@ -197,7 +196,6 @@ let address_timer = 0;
 
 state.on_change(() => {
   scenes.ask(state.scene);
-  knobs.update();
   form.update();
   by_id<HTMLButtonElement>("undo").disabled = !state.can_undo();
   by_id<HTMLButtonElement>("redo").disabled = !state.can_redo();
@@ -211,14 +209,14 @@ picture.on_pointer = (x, y) => looks.ask([x, y]);
 picture.on_drawn = () => space_pane?.picture_changed();
 if (space_pane) {
   space_pane.on_plate = (x, y) => picture.point(x, y);
-  space_pane.on_view = (right, up, toward) => knobs.set_view(right, up, toward);
+  space_pane.on_view = DirectionSphere.set_view;
 }
 theme.on_change(() => {
   read_out.restyle();
   space_pane?.restyle();
-  knobs.update();
+  form.update();
 });
-make_tabs(by_id("tabs"), () => form.update());
+make_tabs(by_id("tabs"), (tab) => form.show(tab.id === "tab-knobs"));
 
 by_id("undo").addEventListener("click", () => state.undo());
 by_id("redo").addEventListener("click", () => state.redo());
@@ -229,11 +227,7 @@ by_id("space-rays").addEventListener("click", (event) => {
   button.setAttribute("aria-pressed", String(shown));
   space_pane?.show_rays(shown);
 });
-by_id("save").addEventListener("click", () => {
-  const id = connection.next_id();
-  told_ids.add(id);
-  connection.send({ type: "save", id, scene: state.scene });
-});
+by_id("save").addEventListener("click", () => ask_and_tell({ type: "save", scene: state.scene }));
 by_id("copy-command").addEventListener("click", () => {
   if (!hello) return;
   const text = command_line(hello.file, state.patch());
@@ -241,11 +235,7 @@ by_id("copy-command").addEventListener("click", () => {
   void copy(text).then((done) => show_toast(done ? "Copied: " + text : text));
 });
 for (const file of ["png", "exr"] as const) {
-  by_id("export-" + file).addEventListener("click", () => {
-    const id = connection.next_id();
-    told_ids.add(id);
-    connection.send({ type: "export", id, file });
-  });
+  by_id("export-" + file).addEventListener("click", () => ask_and_tell({ type: "export", file }));
 }
 
 window.addEventListener("hashchange", () => {

@@ -133,19 +133,19 @@ await check("the first picture appears", async () => {
 });
 
 await check("the knobs show the scene", async () => {
-  expect((await text(page, "#knob-scale-number")) !== "", "the scale is not shown");
-  expect((await text(page, "#knob-method")) !== "", "the method is not shown");
+  expect((await text(page, "#key-field-scale-number")) !== "", "the scale is not shown");
+  expect((await text(page, "#key-integrator-type")) !== "", "the method is not shown");
   expect(await page.$eval("#undo", (node) => node.disabled), "there is something to undo");
 });
 
 let changed = 0;
 let changed_scale = "";
-const original_scale = await text(page, "#knob-scale-number");
+const original_scale = await text(page, "#key-field-scale-number");
 
 await check("a drag of the scale changes the picture", async () => {
-  const start = await page.$eval("#knob-scale", (node) => node.value / node.max);
-  await drag_slider(page, "#knob-scale", start > 0.5 ? start - 0.15 : start + 0.15);
-  changed_scale = await text(page, "#knob-scale-number");
+  const start = await page.$eval("#key-field-scale", (node) => node.value / node.max);
+  await drag_slider(page, "#key-field-scale", start > 0.5 ? start - 0.15 : start + 0.15);
+  changed_scale = await text(page, "#key-field-scale-number");
   expect(changed_scale !== original_scale, "the scale is the same");
   await finished(page, first);
   await page.waitForFunction(() => document.querySelector("#status-stage").textContent.startsWith("Finished"), patience);
@@ -157,26 +157,26 @@ await check("a reload restores the scene", async () => {
   expect((await settled(page)).length > 1, "the address has no fragment");
   await page.reload();
   await finished(page);
-  expect((await text(page, "#knob-scale-number")) === changed_scale, "the scale is another");
+  expect((await text(page, "#key-field-scale-number")) === changed_scale, "the scale is another");
   expect((await checksum(page)) === changed, "the picture is another");
 });
 
 await check("a drag is one step of undo, and redo repeats it", async () => {
-  const before = await text(page, "#knob-scale-number");
+  const before = await text(page, "#key-field-scale-number");
   const picture = Number(await page.$eval("#picture", (node) => node.dataset.picture));
-  await drag_slider(page, "#knob-scale", 0.35);
-  const after = await text(page, "#knob-scale-number");
+  await drag_slider(page, "#key-field-scale", 0.35);
+  const after = await text(page, "#key-field-scale-number");
   expect(after !== before, "the drag has no effect");
   await page.click("#undo");
-  expect((await text(page, "#knob-scale-number")) === before, "undo does not bring the old scale back");
+  expect((await text(page, "#key-field-scale-number")) === before, "undo does not bring the old scale back");
   expect(await page.$eval("#undo", (node) => node.disabled), "the drag was more than one step");
   await page.click("#redo");
-  expect((await text(page, "#knob-scale-number")) === after, "redo does not bring the new scale back");
+  expect((await text(page, "#key-field-scale-number")) === after, "redo does not bring the new scale back");
   await page.focus("#undo");
   await page.keyboard.down("Control");
   await page.keyboard.press("z");
   await page.keyboard.up("Control");
-  expect((await text(page, "#knob-scale-number")) === before, "ctrl-Z has no effect");
+  expect((await text(page, "#key-field-scale-number")) === before, "ctrl-Z has no effect");
   await finished(page, picture);
   await settled(page);
   await page.waitForFunction(() => document.querySelector("#picture").dataset.final === "true", patience);
@@ -190,25 +190,25 @@ await check("the command line has the change", async () => {
 });
 
 await check("the direction of light turns", async () => {
-  const before = await text(page, "#knob-direction-text");
+  const before = await text(page, "#key-light-direction-text");
   const picture = Number(await page.$eval("#picture", (node) => node.dataset.picture));
-  await page.focus("#knob-direction");
+  await page.focus("#key-light-direction");
   await page.keyboard.press("ArrowRight");
   await page.keyboard.press("ArrowUp");
-  expect((await text(page, "#knob-direction-text")) !== before, "the arrow keys have no effect");
-  await page.click('[data-snap="-x"]');
-  expect((await text(page, "#knob-direction-text")).trim().startsWith("−1"), "the button has no effect");
+  expect((await text(page, "#key-light-direction-text")) !== before, "the arrow keys have no effect");
+  await page.click('[data-key="light.direction"] [data-snap="-x"]');
+  expect((await text(page, "#key-light-direction-text")).trim().startsWith("−1"), "the button has no effect");
   await finished(page, picture);
   await page.click("#undo");
   await page.click("#undo");
-  expect((await text(page, "#knob-direction-text")) === before, "undo does not bring the direction back");
+  expect((await text(page, "#key-light-direction-text")) === before, "undo does not bring the direction back");
 });
 
 await check("the flexibility follows the keys", async () => {
-  const before = await text(page, "#knob-flexibility-a-number");
-  await page.$eval("#knob-flexibility-0", (node) => node.focus());
+  const before = await text(page, "#key-bending-a-number");
+  await page.$eval("#flexibility-0", (node) => node.focus());
   await page.keyboard.press("ArrowUp");
-  expect((await text(page, "#knob-flexibility-a-number")) !== before, "a is the same");
+  expect((await text(page, "#key-bending-a-number")) !== before, "a is the same");
   await page.click("#undo");
 });
 
@@ -225,7 +225,7 @@ await check("the 3D pane is drawn", async () => {
 
 await check("all keys has every key of the schema", async () => {
   await page.click("#tab-all-keys");
-  const keys = await page.$$eval("#all-keys [data-key]", (nodes) => nodes.map((node) => node.dataset.key));
+  const keys = await page.$$eval("#keys [data-key]", (nodes) => nodes.map((node) => node.dataset.key));
   expect(keys.length > 100, `there are ${keys.length} keys`);
   for (const key of ["light.photons", "receiver.size", "integrator.seeds.kind", "output.exposure", "obstacles"]) {
     expect(keys.includes(key), key + " is missing");
@@ -233,16 +233,21 @@ await check("all keys has every key of the schema", async () => {
 });
 
 await check("the filter of all keys finds a key, and its row changes the scene", async () => {
-  await page.type("#all-keys-filter", "photons light");
+  await page.type("#keys-filter", "photons light");
   const row = '[data-key="light.photons"]';
   expect(!(await page.$eval(row, (node) => node.hidden)), "the key is not found");
   expect(await page.$eval('[data-key="camera"]', (node) => node.hidden), "other keys are shown");
-  await page.type(row + " input", "0.5\n");
-  expect(!(await page.$eval(row + " .fault", (node) => node.hidden)), "a wrong value is taken");
-  await page.$eval(row + " input", (node) => (node.value = ""));
-  await page.type(row + " input", "65536\n");
+  const box = row + " .number, " + row + " input[type=text]";
+  const enter = async (text) => {
+    await page.$eval(box, (node) => (node.value = ""));
+    await page.type(box, text + "\n");
+  };
+  await enter("0.5");
+  await page.waitForSelector(row + " .fault:not([hidden])", patience);
+  await enter("65536");
   expect(await page.$eval(row, (node) => !node.classList.contains("absent")), "the key is still absent");
-  await page.click(row + " .remove");
+  await page.waitForSelector(row + " .fault[hidden]", patience);
+  await page.click(row + " .reset");
   expect(await page.$eval(row, (node) => node.classList.contains("absent")), "the key is not removed");
   await page.click("#tab-knobs");
 });
@@ -263,11 +268,11 @@ await check("PNG hands out a file", async () => {
 await check("two pages work at the same time", async () => {
   const second = await open(address, faults);
   const picture = await finished(second);
-  expect((await text(second, "#knob-scale-number")) === original_scale, "the second page does not show the original scene");
+  expect((await text(second, "#key-field-scale-number")) === original_scale, "the second page does not show the original scene");
   expect((await checksum(second)) === original, "the second page shows another picture");
-  await drag_slider(second, "#knob-scale", 0.3);
+  await drag_slider(second, "#key-field-scale", 0.3);
   await finished(second, picture);
-  expect((await text(page, "#knob-scale-number")) === changed_scale, "the first page has changed");
+  expect((await text(page, "#key-field-scale-number")) === changed_scale, "the first page has changed");
   await second.close();
 });
 
@@ -301,8 +306,8 @@ await check("a spectrum is shown where the pointer is", async () => {
 
 await check("the view lives on if a page ends during a render", async () => {
   const second = await open(address, []);
-  await second.waitForSelector("#knob-scale");
-  await drag_slider(second, "#knob-scale", 0.4);
+  await second.waitForSelector("#key-field-scale");
+  await drag_slider(second, "#key-field-scale", 0.4);
   await second.close();
   const third = await open(address, []);
   await finished(third);
@@ -317,12 +322,12 @@ await check("a view that was killed and started again is found again", async () 
   await ended;
   await page.waitForFunction(() => !document.querySelector("#banner").hidden, patience);
   const picture = Number(await page.$eval("#picture", (node) => node.dataset.picture));
-  await drag_slider(page, "#knob-scale", 0.45);
-  const scale = await text(page, "#knob-scale-number");
+  await drag_slider(page, "#key-field-scale", 0.45);
+  const scale = await text(page, "#key-field-scale-number");
   expect((await start_server(["--port", port])) === address, "the address is another one");
   await page.waitForFunction(() => document.querySelector("#banner").hidden, patience);
   await finished(page, picture);
-  expect((await text(page, "#knob-scale-number")) === scale, "the change was lost");
+  expect((await text(page, "#key-field-scale-number")) === scale, "the change was lost");
   faults.length = before;  // Connections that failed meanwhile are in the console.
 });
 

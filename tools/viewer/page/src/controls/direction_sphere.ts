@@ -1,40 +1,39 @@
-// The knob for a direction: a sphere that one turns, with the axes of the world as the 3D pane shows them.
+// A direction: a sphere that one turns, with the axes of the world as the 3D pane shows them.
 
 import { button, element, style_value } from "../elements/dom";
 import type { Vector } from "../state/protocol";
-import { dot, normalized, rounded, times, turned } from "../state/vector";
+import { dot, normalized, rounded, times, turned, vector_of } from "../state/vector";
+import type { Control, Key } from "./key";
 
 const size = 132;  // CSS pixels
 const radius = 54;
 const key_angle = (5 * Math.PI) / 180;
 
-export interface DirectionOptions {
-  /** The present direction, and whether it is automatic; null if it is not known yet. */
-  value: () => { direction: Vector | null; automatic: boolean };
-  on_input: (direction: Vector) => void;
-  on_finish: (by_key: boolean) => void;
-  on_automatic: () => void;
-}
-
-export class DirectionSphere {
+export class DirectionSphere implements Control {
   readonly node: HTMLElement;
+  private static readonly all: DirectionSphere[] = [];
+  private static view: { right: Vector; up: Vector; toward: Vector } = { right: [1, 0, 0], up: [0, 0, 1], toward: [0, -1, 0] };
   private readonly canvas: HTMLCanvasElement;
-  private readonly text = element("output", { class: "direction-text", id: "knob-direction-text" });
-  private readonly automatic: HTMLButtonElement;
+  private readonly text: HTMLOutputElement;
   private readonly snaps: [Vector, HTMLButtonElement][] = [];
-  private right: Vector = [1, 0, 0];
-  private up: Vector = [0, 0, 1];
-  private toward: Vector = [0, -1, 0];
 
-  constructor(private readonly options: DirectionOptions) {
+  /** Turns all spheres as the 3D pane is turned. */
+  static set_view(right: Vector, up: Vector, toward: Vector): void {
+    DirectionSphere.view = { right, up, toward };
+    for (const sphere of DirectionSphere.all) sphere.draw();
+  }
+
+  constructor(private readonly key: Key) {
+    DirectionSphere.all.push(this);
+    this.text = element("output", { class: "direction-text", id: key.id + "-text" });
     this.canvas = element("canvas", {
-      id: "knob-direction",
+      id: key.id,
       class: "direction-sphere",
       tabindex: 0,
       role: "application",
-      "aria-label": "Direction of light. Drag the sphere, or use the arrow keys.",
-      "aria-describedby": "knob-direction-text",
-      title: "Drag the sphere to turn the light. Arrow keys: 5 degrees, with shift 1 degree.",
+      "aria-label": key.dotted + ". Drag the sphere, or use the arrow keys.",
+      "aria-describedby": key.id + "-text",
+      title: "Drag the sphere to turn the direction. Arrow keys: 5 degrees, with shift 1 degree.",
     });
     const ratio = Math.min(2, devicePixelRatio);
     this.canvas.width = this.canvas.height = size * ratio;
@@ -45,42 +44,38 @@ export class DirectionSphere {
         const direction: Vector = [0, 0, 0];
         direction[i] = sign;
         const name = (sign > 0 ? "+" : "−") + axis;
-        const snap = button(name, { "data-snap": (sign > 0 ? "+" : "-") + axis, "aria-label": "Light along " + name }, () => {
-          options.on_input(direction);
-          options.on_finish(false);
+        const snap = button(name, { "data-snap": (sign > 0 ? "+" : "-") + axis, "aria-label": key.dotted + " " + name }, () => {
+          key.set(direction);
+          key.finish(false);
         });
         this.snaps.push([direction, snap]);
         snaps.append(snap);
       }
     }
-    this.automatic = button("automatic", { class: "automatic", id: "knob-direction-automatic", "aria-pressed": "false" }, () =>
-      options.on_automatic(),
-    );
-    const side = element("div", { class: "direction-side" }, this.text, snaps, this.automatic);
-    this.node = element("div", { class: "knob direction", "data-knob": "direction" }, this.canvas, side);
+    const side = element("div", { class: "direction-side" }, this.text, snaps);
+    this.node = element("div", { class: "direction" }, this.canvas, side);
     this.listen();
   }
 
-  /** Turns the sphere as the 3D pane is turned. */
-  set_view(right: Vector, up: Vector, toward: Vector): void {
-    [this.right, this.up, this.toward] = [right, up, toward];
-    this.draw();
-  }
-
   update(): void {
-    const { direction, automatic } = this.options.value();
+    const direction = this.direction;
     this.text.textContent = direction ? direction.map((x) => x.toFixed(2).replace("-", "−")).join("  ") : "…";
-    this.automatic.setAttribute("aria-pressed", String(automatic));
     for (const [axis, snap] of this.snaps) {
-      snap.setAttribute("aria-pressed", String(direction !== null && !automatic && dot(normalized(direction), axis) > 0.9999));
+      const is_this = direction !== null && !this.key.automatic && dot(direction, axis) > 0.9999;
+      snap.setAttribute("aria-pressed", String(is_this));
     }
     this.draw();
   }
 
+  /** Null if it is not known yet. */
+  private get direction(): Vector | null {
+    const direction = vector_of(this.key.value);
+    return direction && normalized(direction);
+  }
+
   private turn(horizontal: number, vertical: number): void {
-    const { direction } = this.options.value();
-    const start = direction ? normalized(direction) : this.toward;
-    this.options.on_input(rounded(turned(turned(start, this.up, horizontal), this.right, vertical)));
+    const { right, up, toward } = DirectionSphere.view;
+    this.key.set(rounded(turned(turned(this.direction ?? toward, up, horizontal), right, vertical)), " turned");
   }
 
   private listen(): void {
@@ -95,7 +90,7 @@ export class DirectionSphere {
       last = [event.clientX, event.clientY];
     });
     const end = (): void => {
-      if (last) this.options.on_finish(false);
+      if (last) this.key.finish(false);
       last = null;
     };
     this.canvas.addEventListener("pointerup", end);
@@ -109,7 +104,7 @@ export class DirectionSphere {
       if (!turn) return;
       event.preventDefault();
       this.turn(...turn);
-      this.options.on_finish(true);
+      this.key.finish(true);
     });
   }
 
@@ -117,10 +112,11 @@ export class DirectionSphere {
     const context = this.canvas.getContext("2d");
     if (!context) return;
     const middle = size / 2;
+    const { right, up, toward } = DirectionSphere.view;
     const shown = (v: Vector): [number, number, number] => [
-      middle + radius * dot(v, this.right),
-      middle - radius * dot(v, this.up),
-      dot(v, this.toward),
+      middle + radius * dot(v, right),
+      middle - radius * dot(v, up),
+      dot(v, toward),
     ];
     context.clearRect(0, 0, size, size);
     const shade = context.createRadialGradient(middle - 18, middle - 22, 6, middle, middle, radius);
@@ -135,8 +131,7 @@ export class DirectionSphere {
     context.stroke();
 
     this.draw_axes(context, shown);
-    const { direction } = this.options.value();
-    if (direction) this.draw_arrow(context, normalized(direction), shown);
+    if (this.direction) this.draw_arrow(context, this.direction, shown);
   }
 
   private draw_axes(context: CanvasRenderingContext2D, shown: (v: Vector) => [number, number, number]): void {
@@ -162,7 +157,7 @@ export class DirectionSphere {
     context.globalAlpha = 1;
   }
 
-  /** The light comes from one side of the sphere and leaves at the other, where the handle is. */
+  /** The arrow comes from one side of the sphere and leaves at the other, where the handle is. */
   private draw_arrow(
     context: CanvasRenderingContext2D,
     direction: Vector,
@@ -180,7 +175,7 @@ export class DirectionSphere {
     const angle = Math.atan2(y - y0, x - x0);
     const flat = Math.hypot(x - x0, y - y0) / (2 * radius);
     if (flat > 0.12) {
-      // Two heads along the arrow show which way light travels.
+      // Two heads along the arrow show the way.
       for (const part of [0.3, 0.62]) {
         const [hx, hy] = [x0 + (x - x0) * part, y0 + (y - y0) * part];
         context.beginPath();

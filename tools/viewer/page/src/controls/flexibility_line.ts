@@ -1,20 +1,16 @@
-// The knob for s(λ) = a + b λ: a line over the visible spectrum whose two ends one drags.
+// The flexibility s(λ) = a + b λ: a line over the visible spectrum whose two ends one drags.
 
 import { svg_element, element } from "../elements/dom";
 import { short_text } from "../elements/numbers";
 import { spectrum_color } from "../elements/spectrum_color";
+import { is_object, value_at } from "../state/json";
+import type { Control, Key } from "./key";
 
 const ends = [380, 780] as const;  // nm
 const [width, height] = [300, 128];
 const [left, right, top, bottom] = [34, 290, 10, 96];
 
-export interface FlexibilityOptions {
-  value: () => { a: number; b: number };
-  on_input: (a: number, b: number) => void;
-  on_finish: (by_key: boolean) => void;
-}
-
-export class FlexibilityLine {
+export class FlexibilityLine implements Control {
   readonly node: HTMLElement;
   private readonly svg: SVGSVGElement;
   private readonly grid = svg_element("g", { class: "grid" });
@@ -24,19 +20,21 @@ export class FlexibilityLine {
   private high = 1;
   private held: number | null = null;
 
-  constructor(private readonly options: FlexibilityOptions) {
-    this.svg = svg_element("svg", { viewBox: `0 0 ${width} ${height}`, class: "flexibility", id: "knob-flexibility" });
+  /** @param bending  The object that has a and b. */
+  constructor(private readonly bending: Key) {
+    this.svg = svg_element("svg", { viewBox: `0 0 ${width} ${height}`, class: "flexibility", id: "flexibility" });
     this.handles = ends.map((nm, i) =>
       svg_element("circle", {
-        class: "handle", r: 7, tabindex: 0, role: "slider", "aria-label": `Flexibility at ${nm} nm`, id: `knob-flexibility-${i}`,
+        class: "handle", r: 7, tabindex: 0, role: "slider", "aria-label": `Flexibility at ${nm} nm`, id: `flexibility-${i}`,
       }),
     );
     this.svg.append(rainbow_strip(), this.grid, this.line, ...this.handles);
-    this.node = element("div", { class: "knob" }, this.svg);
+    this.node = element("div", { class: "drawing" }, this.svg);
     this.handles.forEach((handle, i) => this.listen(handle, i));
   }
 
   update(): void {
+    this.node.hidden = is_object(this.bending.given) && "rgb" in this.bending.given;
     const values = this.values();
     if (this.held === null) {
       // 0 is always visible. The range keeps its place during a drag.
@@ -60,7 +58,10 @@ export class FlexibilityLine {
 
   /** The flexibilities at the two ends. */
   private values(): [number, number] {
-    const { a, b } = this.options.value();
+    const [a, b] = ["a", "b"].map((name) => {
+      const value = value_at(this.bending.given, [name]) ?? value_at(this.bending.schema, ["properties", name, "default"]);
+      return typeof value === "number" ? value : 0;
+    }) as [number, number];
     return [a + b * ends[0], a + b * ends[1]];
   }
 
@@ -72,7 +73,9 @@ export class FlexibilityLine {
     const values = this.values();
     values[i] = Math.round(value * 1000) / 1000;
     const b = (values[1] - values[0]) / (ends[1] - ends[0]);
-    this.options.on_input(Number((values[0] - b * ends[0]).toFixed(5)), Number(b.toFixed(7)));
+    const a = Number((values[0] - b * ends[0]).toFixed(5));
+    const others = is_object(this.bending.given) ? this.bending.given : {};
+    this.bending.set({ ...others, a, b: Number(b.toFixed(7)) }, " line");
   }
 
   private listen(handle: SVGCircleElement, i: number): void {
@@ -90,7 +93,7 @@ export class FlexibilityLine {
     const end = (): void => {
       if (this.held === null) return;
       this.held = null;
-      this.options.on_finish(false);
+      this.bending.finish(false);
       this.update();
     };
     handle.addEventListener("pointerup", end);
@@ -101,7 +104,7 @@ export class FlexibilityLine {
       if (!sign) return;
       event.preventDefault();
       this.move(i, this.values()[i]! + sign * step);
-      this.options.on_finish(true);
+      this.bending.finish(true);
     });
   }
 

@@ -1,103 +1,116 @@
-// A knob for a number: label, slider, number box, and a button that makes the value automatic again.
+// A number: slider and number box. A list of a few numbers has several.
 
-import { button, element } from "../elements/dom";
+import { element } from "../elements/dom";
 import { short_text, trimmed } from "../elements/numbers";
-
-export interface SliderOptions {
-  /** For ids. */
-  name: string;
-  label: string;
-  unit?: string;
-  hint?: string;
-  /** Values at the ends. They may change, as when the scale of a field becomes known. */
-  range: () => [number, number];
-  logarithmic?: boolean;
-  integer?: boolean;
-  /** The present value, and whether it is automatic; null if it is not known yet. */
-  value: () => { number: number | null; automatic: boolean };
-  /** The hand moves the slider. */
-  on_input: (value: number) => void;
-  /** The hand has let go. @param by_key  Key presses may follow. */
-  on_finish: (by_key: boolean) => void;
-  /** Makes the value automatic; none: there is no button for it. */
-  on_automatic?: () => void;
-}
+import { is_object, type Json } from "../state/json";
+import { text_of } from "../state/schema";
+import type { Control, Key } from "./key";
 
 const positions = 1000;
 
-export class Slider {
+/** The sliders of a key. */
+export function make_sliders(key: Key): Control {
+  const count = key.main["maxItems"];
+  if (typeof count !== "number") return new Slider(key, null);
+  const sliders = Array.from({ length: count }, (_, i) => new Slider(key, i));
+  const node = element("div", {}, ...sliders.map((slider) => slider.node));
+  return { node, update: () => sliders.forEach((slider) => slider.update()) };
+}
+
+function number_of(value: Json | undefined): number | null {
+  return typeof value === "number" ? value : null;
+}
+
+class Slider implements Control {
   readonly node: HTMLElement;
   private readonly track: HTMLInputElement;
   private readonly box: HTMLInputElement;
-  private readonly automatic: HTMLButtonElement | null = null;
+  private readonly integer: boolean;
+  /** Values at the ends; null: about the value that the render has chosen. */
+  private readonly fixed_ends: [number, number] | null;
+  private ends: [number, number] = [0, 1];
+  private middle: number | null = null;
   private held = false;
   private by_key = false;
-  private ends: [number, number] = [0, 1];
 
-  constructor(private readonly options: SliderOptions) {
-    const id = "knob-" + options.name;
-    this.track = element("input", { type: "range", id, min: 0, max: positions, step: 1 });
-    this.box = element("input", { type: "text", inputmode: "decimal", id: id + "-number", class: "number" });
-    this.box.setAttribute("aria-label", options.label + ", number");
-    this.node = element("div", { class: "knob slider", "data-knob": options.name, title: options.hint ?? "" });
-    const label = element("label", { for: id }, options.label);
-    if (options.unit) label.append(element("span", { class: "unit" }, " " + options.unit));
-    const head = element("div", { class: "knob-head" }, label);
-    this.node.append(head, this.track, this.box);
-    if (options.on_automatic) {
-      this.automatic = button("auto", { class: "automatic", id: id + "-automatic" }, options.on_automatic);
-      this.automatic.setAttribute("aria-label", options.label + ": automatic");
-      this.automatic.title = options.label + ": automatic";
-      head.append(this.automatic);
-    }
+  /** @param index  Of the number in a list; null: the value is a number. */
+  constructor(private readonly key: Key, private readonly index: number | null) {
+    const items = key.main["items"];
+    const schema = is_object(items) ? items : key.main;
+    const range = Array.isArray(key.schema["knob"]) ? key.schema["knob"] : [schema["minimum"], schema["maximum"]];
+    const [low, high] = [number_of(range[0]), number_of(range[1])];
+    this.fixed_ends = low !== null && high !== null ? [low, high] : null;
+    this.integer = text_of(schema, "type") === "integer";
+    const id = key.id + (index === null ? "" : "-" + index);
+    const label = key.name + (index === null ? "" : ` ${index + 1}`);
+    this.track = element("input", { type: "range", id, min: 0, max: positions, step: 1, "aria-label": label });
+    this.box = element("input", { type: "text", inputmode: "decimal", id: id + "-number", class: "number", "aria-label": label + ", number" });
+    this.node = element("div", { class: "slider" }, this.track, this.box);
     this.listen();
   }
 
   update(): void {
-    const { number, automatic } = this.options.value();
-    if (!this.held) this.ends = this.options.range();
-    if (!this.held) this.track.value = String(number === null ? positions / 2 : this.position_of(number));
+    const number = this.number;
+    if (!this.held) {
+      this.set_ends(number);
+      this.track.value = String(number === null ? positions / 2 : this.position_of(number));
+    }
     this.box.placeholder = number === null ? "auto" : "";
     this.track.setAttribute("aria-valuetext", number === null ? "automatic" : short_text(number));
-    if (document.activeElement !== this.box) this.box.value = number === null ? "" : short_text(number);
-    this.node.classList.toggle("is-automatic", automatic);
-    this.automatic?.setAttribute("aria-pressed", String(automatic));
+    if (document.activeElement !== this.box) this.show_number();
+  }
+
+  private get number(): number | null {
+    const value = this.key.value;
+    return number_of(this.index === null ? value : Array.isArray(value) ? value[this.index] : undefined);
+  }
+
+  private set number(number: number) {
+    const list = Array.isArray(this.key.value) ? this.key.value.map((x) => (typeof x === "number" ? trimmed(x) : x)) : [];
+    if (this.index !== null) list[this.index] = number;
+    this.key.set(this.index === null ? number : list, ` ${this.index ?? ""}`);
+  }
+
+  private show_number(): void {
+    this.box.value = this.number === null ? "" : short_text(this.number);
+  }
+
+  private set_ends(number: number | null): void {
+    if (number && (this.middle === null || this.key.automatic)) this.middle = Math.abs(number);
+    const middle = this.middle ?? 1;
+    const present = Math.abs(number || middle);
+    this.ends = this.fixed_ends ?? [Math.min(middle / 100, present), Math.max(middle * 100, present)];
+  }
+
+  private get logarithmic(): boolean {
+    const [low, high] = this.ends;
+    return low > 0 && high > 10 * low;
   }
 
   private position_of(value: number): number {
     const [low, high] = this.ends;
-    const part = this.options.logarithmic
-      ? Math.log(Math.abs(value) / low) / Math.log(high / low)
-      : (value - low) / (high - low);
+    const part = this.logarithmic ? Math.log(Math.abs(value) / low) / Math.log(high / low) : (value - low) / (high - low);
     return Math.round(Math.min(1, Math.max(0, part)) * positions);
   }
 
   private value_of(position: number): number {
     const [low, high] = this.ends;
     const part = position / positions;
-    if (this.options.logarithmic) {
-      // A negative number keeps its sign.
-      const sign = (this.options.value().number ?? 1) < 0 ? -1 : 1;
-      return this.tidied(sign * low * Math.pow(high / low, part));
-    }
-    return this.tidied(low + (high - low) * part);
-  }
-
-  private tidied(value: number): number {
-    if (this.options.logarithmic) return this.options.integer ? Math.round(trimmed(value, 3)) : trimmed(value, 3);
-    if (this.options.integer) return Math.round(value);
-    const [low, high] = this.ends;
+    // A negative number keeps its sign.
+    const sign = (this.number ?? 1) < 0 ? -1 : 1;
+    const value = this.logarithmic ? trimmed(sign * low * Math.pow(high / low, part), 3) : low + (high - low) * part;
+    if (this.integer) return Math.round(value);
     const digits = Math.max(0, Math.ceil(-Math.log10((high - low) / positions)));
-    return Number(value.toFixed(digits));
+    return this.logarithmic ? value : Number(value.toFixed(digits));
   }
 
   private listen(): void {
     this.track.addEventListener("pointerdown", () => (this.held = true));
     this.track.addEventListener("keydown", () => (this.by_key = true));
     this.track.addEventListener("pointerup", () => (this.by_key = false));
-    this.track.addEventListener("input", () => this.options.on_input(this.value_of(this.track.valueAsNumber)));
+    this.track.addEventListener("input", () => (this.number = this.value_of(this.track.valueAsNumber)));
     this.track.addEventListener("change", () => {
-      this.options.on_finish(this.by_key && !this.held);
+      this.key.finish(this.by_key && !this.held);
       this.held = false;
       this.by_key = false;
       this.update();
@@ -106,11 +119,9 @@ export class Slider {
     this.box.addEventListener("keydown", (event) => {
       if (event.key === "ArrowUp" || event.key === "ArrowDown") {
         event.preventDefault();
-        const step = event.key === "ArrowUp" ? 1 : -1;
-        this.options.on_input(this.value_of(this.track.valueAsNumber + step * 10));
-        this.options.on_finish(true);
-        const { number } = this.options.value();
-        if (number !== null) this.box.value = short_text(number);
+        this.number = this.value_of(this.track.valueAsNumber + (event.key === "ArrowUp" ? 10 : -10));
+        this.key.finish(true);
+        this.show_number();
       }
       if (event.key === "Escape") {
         this.box.blur();
@@ -120,11 +131,10 @@ export class Slider {
     this.box.addEventListener("change", () => {
       const value = Number(this.box.value.replace(",", "."));
       if (this.box.value.trim() !== "" && Number.isFinite(value)) {
-        this.options.on_input(this.options.integer ? Math.round(value) : value);
-        this.options.on_finish(false);
+        this.number = value;
+        this.key.finish(false);
       }
-      const { number } = this.options.value();
-      this.box.value = number === null ? "" : short_text(number);
+      this.show_number();
     });
   }
 }

@@ -1,15 +1,12 @@
-// The tabs of the panel.
+// Tabs that show one panel in different ways.
 
-/** @param on_choice  Called after the panel of `tab` is shown. */
+/** @param on_choice  Called with the tab that is chosen. */
 export function make_tabs(list: HTMLElement, on_choice: (tab: HTMLElement) => void): void {
   const tabs = [...list.querySelectorAll<HTMLElement>("[role=tab]")];
   const choose = (chosen: HTMLElement): void => {
     for (const tab of tabs) {
-      const selected = tab === chosen;
-      tab.setAttribute("aria-selected", String(selected));
-      tab.tabIndex = selected ? 0 : -1;
-      const panel = document.getElementById(tab.getAttribute("aria-controls") ?? "");
-      if (panel) panel.hidden = !selected;
+      tab.setAttribute("aria-selected", String(tab === chosen));
+      tab.tabIndex = tab === chosen ? 0 : -1;
     }
     on_choice(chosen);
   };

@@ -5,36 +5,33 @@ const themes = ["system", "light", "dark"] as const;
 const marks = { system: "◐", light: "☀", dark: "☾" };
 
 export class Theme {
-  private current: (typeof themes)[number] = "system";
+  private current: (typeof themes)[number];
   private listeners: (() => void)[] = [];
+  private readonly system = matchMedia("(prefers-color-scheme: dark)");
 
   constructor(private readonly switch_button: HTMLButtonElement) {
     const stored = localStorage.getItem(key);
-    this.choose(themes.find((theme) => theme === stored) ?? "system");
+    this.current = themes.find((theme) => theme === stored) ?? "system";
+    this.show();
     switch_button.addEventListener("click", () => {
-      const next = themes[(themes.indexOf(this.current) + 1) % themes.length]!;
-      localStorage.setItem(key, next);
-      this.choose(next);
+      this.current = themes[(themes.indexOf(this.current) + 1) % themes.length]!;
+      localStorage.setItem(key, this.current);
+      this.show();
     });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.notify());
+    this.system.addEventListener("change", () => this.show());
   }
 
   on_change(listener: () => void): void {
     this.listeners.push(listener);
   }
 
-  private choose(theme: (typeof themes)[number]): void {
-    this.current = theme;
-    if (theme === "system") delete document.documentElement.dataset["theme"];
-    else document.documentElement.dataset["theme"] = theme;
-    this.switch_button.textContent = marks[theme];
-    const name = { system: "as the system", light: "light", dark: "dark" }[theme];
+  private show(): void {
+    const system = this.system.matches ? "dark" : "light";
+    document.documentElement.dataset["theme"] = this.current === "system" ? system : this.current;
+    this.switch_button.textContent = marks[this.current];
+    const name = this.current === "system" ? "as the system" : this.current;
     this.switch_button.title = "Theme: " + name;
     this.switch_button.setAttribute("aria-label", "Theme: " + name);
-    this.notify();
-  }
-
-  private notify(): void {
     for (const listener of this.listeners) listener();
   }
 }

@@ -19,15 +19,11 @@ export class Connection {
     this.open();
   }
 
-  next_id(): number {
-    return ++this.last_id;
-  }
-
-  /** @returns false if there is no connection; the request is then lost. */
-  send(request: Request): boolean {
-    if (this.socket?.readyState !== WebSocket.OPEN) return false;
-    this.socket.send(JSON.stringify(request));
-    return true;
+  /** @returns the id of the request; null if there is no connection, and the request is lost. */
+  send(request: Request): number | null {
+    if (this.socket?.readyState !== WebSocket.OPEN) return null;
+    this.socket.send(JSON.stringify({ ...request, id: ++this.last_id }));
+    return this.last_id;
   }
 
   private open(): void {

@@ -4,12 +4,13 @@ import type { Json, JsonObject } from "./json";
 
 export type Vector = [number, number, number];
 
+/** The connection adds an `id`, which the answers have. */
 export type Request =
-  | { type: "scene"; id: number; scene: JsonObject }
-  | { type: "look"; id: number; x: number; y: number }
-  | { type: "space"; id: number }
-  | { type: "save"; id: number; scene: JsonObject }
-  | { type: "export"; id: number; file: "png" | "exr" };
+  | { type: "scene"; scene: JsonObject }
+  | { type: "look"; x: number; y: number }
+  | { type: "space" }
+  | { type: "save"; scene: JsonObject }
+  | { type: "export"; file: "png" | "exr" };
 
 export interface FieldInformation {
   voxels: Vector;
@@ -104,11 +105,10 @@ export interface PictureHeader {
   full_height: number;
   format: string;
   seconds: number;
-  /** The scale and the direction that were used, where the scene says "auto". */
-  scale: number;
-  direction: Vector;
-  /** In stops; where the scene says "auto", the one that was chosen. */
-  exposure: number;
+  /** A part of a scene: values that were used where the scene leaves them open. */
+  chosen: JsonObject;
+  /** Names that keys may have, in the place of their values. */
+  examples: JsonObject;
   notes?: string[];
   warnings?: string[];
 }

@@ -10,6 +10,9 @@ const most_steps = 500;
 export class State {
   original: JsonObject = {};
   scene: JsonObject = {};
+  /** What the render of the last picture has chosen where the scene leaves it open, and suggestions: as parts of scenes. */
+  chosen: JsonObject = {};
+  examples: JsonObject = {};
   private past: JsonObject[] = [];
   private future: JsonObject[] = [];
   private gesture: string | null = null;
@@ -64,8 +67,8 @@ export class State {
     this.replace(with_value(this.scene, path, value), gesture);
   }
 
-  remove(path: Path, gesture: string | null = null): void {
-    this.replace(without_value(this.scene, path), gesture);
+  remove(path: Path): void {
+    this.replace(without_value(this.scene, path));
   }
 
   /**

@@ -7,7 +7,7 @@ export function dot(a: Vector, b: Vector): number {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-export function cross(a: Vector, b: Vector): Vector {
+function cross(a: Vector, b: Vector): Vector {
   return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 }
 
@@ -15,16 +15,12 @@ export function times(factor: number, v: Vector): Vector {
   return [factor * v[0], factor * v[1], factor * v[2]];
 }
 
-export function plus(...list: Vector[]): Vector {
+function plus(...list: Vector[]): Vector {
   return list.reduce((sum, v): Vector => [sum[0] + v[0], sum[1] + v[1], sum[2] + v[2]], [0, 0, 0]);
 }
 
-export function length(v: Vector): number {
-  return Math.hypot(...v);
-}
-
 export function normalized(v: Vector): Vector {
-  return times(1 / (length(v) || 1), v);
+  return times(1 / (Math.hypot(...v) || 1), v);
 }
 
 /** `v` turned by `angle` (radians) about the unit vector `axis`. */
@@ -42,13 +38,4 @@ export function rounded(v: Vector): Vector {
 export function vector_of(value: Json | undefined): Vector | null {
   const fits = Array.isArray(value) && value.length === 3 && value.every((x) => typeof x === "number");
   return fits ? (value as Vector) : null;
-}
-
-/** Right and up of the plate across light that travels along `direction`, as seen along the light. */
-export function plate_axes(direction: Vector, up: Vector | null): { right: Vector; up: Vector } {
-  const d = normalized(direction);
-  const along_z = Math.hypot(d[0], d[1]) < 1e-6;
-  const start: Vector = up ?? (along_z ? [0, 1, 0] : [0, 0, 1]);
-  const right = normalized(cross(d, start));
-  return { right, up: cross(right, d) };
 }
