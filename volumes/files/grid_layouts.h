@@ -7,9 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "volumes/vdb/tensor_entry.h"
-
 namespace tensorray {
+
+/// The tensor entry that a component of a grid's value is stored in. Of a vector, `row` is the component.
+struct TensorEntry {
+  int component, row, column;
+};
 
 /// How a tensor is computed from a grid that does not store tensors.
 enum class Derive {

@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <vector>
 
+#include "volumes/files/grid_layouts.h"
 #include "volumes/grids/tensor_grid.h"
 #include "volumes/tensors/finite_differences.h"
-#include "volumes/vdb/tensor_entry.h"
 #include "volumes/vdb/vdb_archive.h"
 
 namespace tensorray {

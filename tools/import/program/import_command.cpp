@@ -338,8 +338,8 @@ void add_import_options(CLI::App& program, Progress& progress) {
       ->option_text("STEPS");
   program
       .add_option("--memory", options->memory,
-                  "Keep voxels in files on the disk of the output, of which the system has in memory what is free, and "
-                  "work in so much memory, as 8G or 500M")
+                  "Keep voxels in files on the disk of the output, of which the system has in memory what is free, "
+                  "whatever the size, as 8G or 500M")
       ->transform(CLI::AsSizeValue(false))
       ->check([](const std::string& bytes) {  // CLI11 makes large numbers of negative ones.
         const bool is_size = bytes.find('-') == std::string::npos && bytes.size() <= 18;
