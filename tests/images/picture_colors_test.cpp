@@ -168,7 +168,10 @@ std::string profile_of_tables() {
   cmsPipeline* tables = cmsPipelineAlloc(nullptr, 3, 3);
   cmsStage* table = cmsStageAllocCLut16bit(nullptr, 33, 3, 3, nullptr);
   cmsStageSampleCLut16bit(table, sampler, nullptr, 0);
-  cmsPipelineInsertStage(tables, cmsAT_BEGIN, table);
+  // The format wants curves before and behind a table.
+  for (cmsStage* stage :
+       {cmsStageAllocToneCurves(nullptr, 3, nullptr), table, cmsStageAllocToneCurves(nullptr, 3, nullptr)})
+    cmsPipelineInsertStage(tables, cmsAT_END, stage);
   cmsWriteTag(profile, cmsSigAToB0Tag, tables);
   cmsUInt32Number size = 0;
   cmsSaveProfileToMem(profile, nullptr, &size);
