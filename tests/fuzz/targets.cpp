@@ -221,28 +221,17 @@ bool read_vdb_tree(const std::string& bytes) {
 }  // namespace
 
 const std::vector<FuzzTarget>& fuzz_targets() {
-  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file},
-                                               {"override", read_overrides},
-                                               {"frames", read_frames},
-                                               {"text", read_seeds_and_spectrum},
-                                               {"work", read_kept_work},
-                                               {"kept", read_kept_unit},
-                                               {"ply", read_ply_mesh},
-                                               {"obj", read_obj_mesh},
-                                               {"icc", read_profile},
-                                               {"png", read_png_chunks},
-                                               {"tck", read_tck},
-                                               {"npy", read_npy},
-                                               {"nrrd", read_nrrd},
-                                               {"nifti", read_nifti},
-                                               {"mrtrix", read_mrtrix},
-                                               {"metaimage", read_metaimage},
-                                               {"xdmf", read_xdmf},
-                                               {"ensight", read_ensight},
-                                               {"netcdf", read_netcdf},
-                                               {"vdb_tree", read_vdb_tree},
-                                               {"http", read_http},
-                                               {"page", read_page_message}};
+  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file}, {"override", read_overrides},
+                                               {"frames", read_frames},    {"text", read_seeds_and_spectrum},
+                                               {"work", read_kept_work},   {"kept", read_kept_unit},
+                                               {"ply", read_ply_mesh},     {"obj", read_obj_mesh},
+                                               {"icc", read_profile},      {"png", read_png_chunks},
+                                               {"tck", read_tck},          {"npy", read_npy},
+                                               {"nrrd", read_nrrd},        {"nifti", read_nifti},
+                                               {"mrtrix", read_mrtrix},    {"metaimage", read_metaimage},
+                                               {"xdmf", read_xdmf},        {"ensight", read_ensight},
+                                               {"netcdf", read_netcdf},    {"vdb_tree", read_vdb_tree},
+                                               {"http", read_http},        {"page", read_page_message}};
   return targets;
 }
 

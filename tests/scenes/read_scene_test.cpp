@@ -223,38 +223,17 @@ TEST_F(ReadScene, WrongTypesSayWhatIsExpectedAndFound) {
   EXPECT_THAT(error({"light.direction=[0,1,null]"}), HasSubstr("a list of 3 numbers"));
 }
 
+/// What no bound of the schema refuses; schema_test.cpp has the others.
 TEST_F(ReadScene, ValuesOutOfRange) {
-  const Overrides wrong{"light.photons=0",
-                        "light.photons=1.5",
-                        "light.photons=1e30",
-                        "light.photons=-1",
-                        "seed=18446744073709551616",
-                        "light.direction=[0,0,0]",
-                        "light.direction=[1e-200,0,0]",
-                        "light.direction=[1e200,0,0]",
-                        "light.wavelengths.min=300",
-                        "light.wavelengths.max=900",
-                        "light.wavelengths.count=0",
-                        "light.irradiance=0",
-                        "light.irradiance=NaN",
-                        "light.irradiance=1e999",
-                        "light.aperture.size=[1,0]",
-                        "bending.step=0",
-                        "bending.tolerance=0",
-                        "bending.max_steps=4294967297",
-                        "field.scale=0",
-                        "receiver.distance=-1",
-                        "receiver.normal=[0,0,0]",
-                        "receiver.size=[1,-1]",
-                        "receiver.resolution=[1,0]",
-                        "receiver.resolution=40000",
-                        "integrator.density.tau=0",
-                        "output.image=picture.bmp",
-                        "output.image=png",
-                        "output.exr=picture.png",
-                        "output.spectral=spectra.csv",
-                        "output.photons=photons.ply",
-                        "output.fluence=light.exr"};
+  const Overrides wrong{"light.photons=1e30",           "seed=18446744073709551616",
+                        "light.direction=[0,0,0]",      "light.direction=[1e-200,0,0]",
+                        "light.direction=[1e200,0,0]",  "light.irradiance=NaN",
+                        "light.irradiance=1e999",       "light.aperture.size=[1,0]",
+                        "bending.max_steps=4294967297", "receiver.normal=[0,0,0]",
+                        "receiver.size=[1,-1]",         "receiver.resolution=[1,0]",
+                        "output.image=picture.bmp",     "output.image=png",
+                        "output.exr=picture.png",       "output.spectral=spectra.csv",
+                        "output.photons=photons.ply",   "output.fluence=light.exr"};
   for (const std::string& change : wrong) {
     std::string pointer = "/" + change.substr(0, change.find('='));
     for (char& c : pointer) c = c == '.' ? '/' : c;

@@ -236,7 +236,7 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
       };
       return draw_lens(light, bands, radiance, 1, true, Progress());
     };
-    constexpr int many = 256;
+    constexpr int many = 128;
     std::vector<double> each;
     for (int i = 0; i < many; ++i) each.push_back(-0.1 + 0.2 * (i + 0.5) / many);
     const LensPicture continuum = seen({-0.1, 0.1}, true, 8), single = seen(each, false, many);
@@ -354,8 +354,8 @@ TEST(Lens, PixelsHaveTheDisplayValueOfTheirRays) {
     const Plate &from = back ? bench.receiver : bench.image.plane, &to = back ? bench.image.plane : bench.receiver;
     const LensMap map(bench.field, bench.surfaces, bench.bending, from, to, (back ? -1 : 1) * Vector3d::UnitZ());
     double most = 0;
-    for (int y = 0; y < size.y(); ++y)
-      for (int x = 0; x < size.x(); ++x) {
+    for (int y = 1; y < size.y(); y += 3)
+      for (int x = 1; x < size.x(); x += 3) {
         const LensPoint& point = point_at(seen, x, y);
         ASSERT_EQ(point.end, LensEnd::image);
         const Vector2d at = plane_coordinates(bench.receiver, bench.receiver.to_world(Vector2d(x + 0.5, y + 0.5)));

@@ -208,16 +208,20 @@ class Sensor : public ::testing::Test {
     Surfaces surfaces = surfaces_of(field_);
     surfaces.plate = sensor;
     const Geometry geometry(std::move(surfaces));
-    Average flux;
+    RayBatch rays;
+    std::vector<double> emitted;
     for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(photons); ++i) {
       Vector3d point, direction;
       start(emitter, 1, i, point, direction);
-      RayBatch rays;
       rays.add(point, direction, s);
-      trace(field_, geometry, {}, rays);
+      emitted.push_back(radiance(point));
+    }
+    trace(field_, geometry, {}, rays);
+    Average flux;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
       // The sensor sees one side.
-      const bool arrives = rays.end[0] == RayEnd::plate && rays.direction[0].dot(sensor.normal()) > 0;
-      flux.add(arrives ? pi * size_ * size_ * radiance(point) : 0);
+      const bool arrives = rays.end[i] == RayEnd::plate && rays.direction[i].dot(sensor.normal()) > 0;
+      flux.add(arrives ? pi * size_ * size_ * emitted[i] : 0);
     }
     return flux;
   }

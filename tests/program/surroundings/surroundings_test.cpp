@@ -59,6 +59,7 @@ const std::vector<Place> places{
      false},
     {"a working folder that is gone", "mkdir gone; cd gone; rmdir ../gone; exec", {}},
     {"another locale", "LC_ALL=de_DE.UTF-8 LANG=de_DE.UTF-8 exec", {}},
+    {"one processor", "exec taskset 1", {}},
     {"few descriptors", "ulimit -n 16; exec", {}},
     {"little stack", "ulimit -s 256; exec", {}},
     {"too little stack", "ulimit -s 64; exec", {{"", {1, "ulimit -s"}}}},

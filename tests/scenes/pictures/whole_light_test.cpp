@@ -37,7 +37,7 @@ std::pair<std::string, std::string> points_and_lamp(const std::string& integrato
 /// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
 TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   const auto [points, lamp] =
-      points_and_lamp(R"("max_samples": 64, "min_samples": 64, "caustic": {"resolution": 256, "rays": 20000})");
+      points_and_lamp(R"("max_samples": 128, "min_samples": 128, "caustic": {"resolution": 256, "rays": 20000})");
   write("scene.json", points);
   // Light that is traced beforehand has little noise.
   const Image forwards = render({"integrator.max_samples=16", "integrator.min_samples=16"});
@@ -47,7 +47,7 @@ TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   EXPECT_GT(mean(forwards, "G"), 0.2);
   EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
   // Photons beside the other ways to find the lamp: whatever law light follows.
-  Settings few{"integrator.photons.per_pass=1024", "integrator.max_samples=24", "integrator.min_samples=24"};
+  Settings few{"integrator.photons.per_pass=1024", "integrator.max_samples=48", "integrator.min_samples=48"};
   const Image photons = render(few);
   few.push_back("integrator.conserve=radiance");
   const Image other_photons = render(few);

@@ -1,6 +1,5 @@
-// The shape of functions: short lists of parameters, and a definition in the room of the declaration.
+// Functions are defined in the room of their declaration.
 
-#include <algorithm>
 #include <cctype>
 #include <fstream>
 #include <iterator>
@@ -43,41 +42,14 @@ std::string code_of(const std::string& file) {
   return code;
 }
 
-/// The index behind the bracket that closes the one before `begin`; and what stands at the level between them.
-std::size_t end_of_bracket(const std::string& code, std::size_t begin, std::string& level) {
-  int depth = 1, angles = 0;
-  std::size_t i = begin;
-  for (; i < code.size() && depth > 0; ++i) {
-    const char c = code[i];
-    if (c == ')' || c == ']' || c == '}') --depth;
-    if (c == '>' && angles > 0) --angles;
-    if (depth == 1 && angles == 0) level += c;
-    if (c == '(' || c == '[' || c == '{') ++depth;
-    if (c == '<' && i > 0 && std::isalnum(static_cast<unsigned char>(code[i - 1]))) ++angles;
+/// The index behind the bracket that closes the one before `begin`.
+std::size_t end_of_bracket(const std::string& code, std::size_t begin) {
+  int depth = 1;
+  for (; begin < code.size() && depth > 0; ++begin) {
+    if (code[begin] == '(') ++depth;
+    if (code[begin] == ')') --depth;
   }
-  return i;
-}
-
-/// The functions of a file, by name, with the greatest number of their parameters. Calls do not count: no type stands
-/// before them, and no body, `;` or specifier of a declaration behind. Nor do variables: their arguments have no types.
-std::map<std::string, std::size_t> parameters_in(const std::string& code) {
-  static const std::regex begin(R"(([A-Za-z_][\w:]*|[&*>])\s+(\w+)\(|[&*](\w+)\()");
-  static const std::regex statement(R"(return|else|new|throw|case|in)"),
-      behind(R"(\s*(const|noexcept|override|[;{:]|->|=))");
-  static const std::regex type_and_name(R"([\w>][\s&*]+\w)");
-  std::map<std::string, std::size_t> result;
-  for (auto match = std::sregex_iterator(code.begin(), code.end(), begin); match != std::sregex_iterator(); ++match) {
-    if (std::regex_match((*match)[1].str(), statement)) continue;
-    std::string level;
-    const auto first = static_cast<std::size_t>(match->position() + match->length());
-    const auto end = code.begin() + static_cast<std::ptrdiff_t>(end_of_bracket(code, first, level));
-    if (!std::regex_search(end, code.end(), behind, std::regex_constants::match_continuous)) continue;
-    if (!std::regex_search(level.substr(0, level.find(',')), type_and_name)) continue;
-    const std::string name = (*match)[2].matched ? (*match)[2] : (*match)[3];
-    std::size_t& most = result[name];
-    most = std::max(most, static_cast<std::size_t>(std::count(level.begin(), level.end(), ',') + 1));
-  }
-  return result;
+  return begin;
 }
 
 std::set<std::string> files() {
@@ -85,20 +57,6 @@ std::set<std::string> files() {
   for (const std::string& top : top_folders())
     for (const test::Line& line : lines_of(top)) result.insert(line.file);
   return result;
-}
-
-/// What belongs together stands in a struct.
-TEST(Structure, FunctionsHaveAtMostSixParameters) {
-  // In the innermost loops, structs of vectors would pass through memory.
-  const std::set<std::string> vector_code{"bend_strongly", "add_spans"};
-  std::set<std::string> found;
-  for (const std::string& file : files())
-    for (const auto& [name, count] : parameters_in(code_of(file))) {
-      if (count <= 6) continue;
-      EXPECT_TRUE(vector_code.count(name)) << file << ": " << name << " has " << count;
-      found.insert(name);
-    }
-  EXPECT_EQ(found, vector_code);
 }
 
 /// Code without what stands between two texts, every time.
@@ -116,9 +74,8 @@ std::set<std::string> free_functions(const std::string& code, char mark) {
       R"(\n(?!using|return|static|#|namespace|struct|class)[\w:][\w:<>,&* ]*[\w>&*] ?[&*]*\b(\w+)\()");
   std::set<std::string> names;
   for (auto match = std::sregex_iterator(code.begin(), code.end(), begin); match != std::sregex_iterator(); ++match) {
-    std::string level;
     const auto first = static_cast<std::size_t>(match->position() + match->length());
-    const std::size_t end = code.find_first_not_of(" \n", end_of_bracket(code, first, level));
+    const std::size_t end = code.find_first_not_of(" \n", end_of_bracket(code, first));
     if (end != std::string::npos && code[end] == mark) names.insert((*match)[1]);
   }
   return names;
