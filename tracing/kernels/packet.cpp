@@ -10,7 +10,7 @@
 namespace tensorray::packets {
 
 PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& settings_)
-    : field(field_), settings(settings_) {
+    : field(field_), settings(settings_), method(settings_.is_splitting ? splitting_method : splitting4_method) {
   const Eigen::Matrix3d M = field.to_index().linear();
   const Eigen::Matrix3d to_world = field.to_world().linear();
   adaptive = settings.step == 0;
@@ -19,7 +19,7 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
   longest_step = adaptive ? static_cast<float>(step_lengths::longest_composed) : settings.step;
   // No voxel is longer along any direction. (The norm is not less than the greatest singular value.)
   const float longest_voxel = static_cast<float>(to_world.norm());
-  longest_kick = longest_step * static_cast<float>(splitting4_method.kick[Composition::kicks / 2]) * longest_voxel;
+  longest_kick = longest_step * static_cast<float>(method.longest_kick) * longest_voxel;
   for (int axis = 0; axis < 3; ++axis) {
     for (int column = 0; column < 3; ++column) to_index[axis][column] = static_cast<float>(M(axis, column));
     first[axis] = static_cast<std::int32_t>(field.voxels().min()[axis]);

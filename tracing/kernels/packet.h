@@ -22,6 +22,7 @@ struct PacketMedium {
 
   const TensorField& field;
   const KernelSettings& settings;
+  const Composition& method;
   bool adaptive;       // Whether the error sets the lengths of steps.
   bool bounded;        // Whether the limit of length may end rays within the field.
   float unit;          // A power of two near a voxel's edge, world units: squares of lengths in it are not extreme.
@@ -79,7 +80,7 @@ struct alignas(64) Packet {
   PerRay sample[3];    // Positions of the samples.
   PerRay voxel;        // Number, in the brick, of the first coefficient that the sample needs.
   PerRay fraction[3];  // Position within the cell.
-  PerRay tensor[8];    // T − T₂₂ I, column by column, component after component.
+  PerRay tensor[8];    // Stored components of the tensors (see TensorBrick), component after component.
   PerRay p_next[3], v_next[3], u_next[3];
   PerRay change_of_step;  // Λ of this step.
   PerRay excess;          // Of adaptive steps: the error divided by the tolerance.
@@ -106,7 +107,7 @@ struct StrongKick {
   float direction[3], log_radiance_scale;
 };
 
-/// @param T  T up to a multiple of I, column by column. @param factor  σ h.
+/// @param T  T − T₂₂ I, column by column. @param factor  σ h.
 StrongKick strong_kick(const float T[9], float factor, const float v[3]);
 
 /// Whether the step of a lane, from p to p_next, meets a surface.

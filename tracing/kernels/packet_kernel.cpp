@@ -33,9 +33,9 @@ constexpr int lanes = 1;
 std::uint64_t trace(const PacketMedium&, KernelRays&) { return 0; }
 #else
 
-/// Takes rays, with or without differentials, through the field in packets: fills a packet, steps it until all of its
-/// rays have ended, and takes those that leave the extent to its faces.
-template <bool differentials>
+/// Takes rays, with or without differentials, through a field of tensors with so many components, in packets: fills a
+/// packet, steps it until all of its rays have ended, and takes those that leave the extent to its faces.
+template <int components, bool differentials>
 class Kernel {
  public:
   Kernel(const PacketMedium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
@@ -77,8 +77,8 @@ HWY_INLINE void for_lanes(std::uint32_t which, const Function& f) {
 }
 
 /// Copies a ray into a lane.
-template <bool differentials>
-void Kernel<differentials>::enter(Packet& packet, int lane) {
+template <int components, bool differentials>
+void Kernel<components, differentials>::enter(Packet& packet, int lane) {
   const KernelRay& ray = rays_[packet.ray[lane]];
   for (int axis = 0; axis < 3; ++axis) {
     packet.p[axis][lane] = ray.place.position[axis];
@@ -96,8 +96,8 @@ void Kernel<differentials>::enter(Packet& packet, int lane) {
 }
 
 /// Copies a ray, without the values that depend on its brick (see `begin`).
-template <bool differentials>
-void Kernel<differentials>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
+template <int components, bool differentials>
+void Kernel<components, differentials>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
   for (int axis = 0; axis < 3; ++axis) {
     to.p[axis][lane] = from.p[axis][of];
     to.v[axis][lane] = from.v[axis][of];
@@ -118,8 +118,8 @@ void Kernel<differentials>::copy_lane(const Packet& from, int of, Packet& to, in
 }
 
 /// Copies the end of a lane's step.
-template <bool differentials>
-void Kernel<differentials>::copy_end(const Packet& from, int of, Packet& to, int lane) {
+template <int components, bool differentials>
+void Kernel<components, differentials>::copy_end(const Packet& from, int of, Packet& to, int lane) {
   for (int axis = 0; axis < 3; ++axis) {
     to.p_next[axis][lane] = from.p_next[axis][of];
     to.v_next[axis][lane] = from.v_next[axis][of];
@@ -128,8 +128,8 @@ void Kernel<differentials>::copy_end(const Packet& from, int of, Packet& to, int
 }
 
 /// Moves the remaining rays to the front if that frees a vector. The other lanes repeat one of these rays.
-template <bool differentials>
-void Kernel<differentials>::compact(Packet& packet) {
+template <int components, bool differentials>
+void Kernel<components, differentials>::compact(Packet& packet) {
   const int count = static_cast<int>(hwy::PopCount(packet.alive));
   if (count <= (packet.vectors - 1) * lanes) {
     int to = 0;
@@ -146,8 +146,8 @@ void Kernel<differentials>::compact(Packet& packet) {
   begin(medium_, packet);
 }
 
-template <bool differentials>
-void Kernel<differentials>::fill(Packet& packet) {
+template <int components, bool differentials>
+void Kernel<components, differentials>::fill(Packet& packet) {
   if (next_ == rays_.size()) return;
   const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
   packet.alive = ~0u >> (packet_rays - count);
@@ -171,8 +171,8 @@ void Kernel<differentials>::fill(Packet& packet) {
 }
 
 /// The lanes that cannot take this step, as bits. Sets those that meet a surface.
-template <bool differentials>
-HWY_NOINLINE std::uint32_t Kernel<differentials>::stopped(Packet& packet) const {
+template <int components, bool differentials>
+HWY_NOINLINE std::uint32_t Kernel<components, differentials>::stopped(Packet& packet) const {
   std::uint32_t stop = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F3 v = load(packet.v_next, i);
@@ -191,8 +191,8 @@ HWY_NOINLINE std::uint32_t Kernel<differentials>::stopped(Packet& packet) const 
 
 /// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
 /// packet counts.
-template <bool differentials>
-HWY_NOINLINE std::uint32_t Kernel<differentials>::spent(const Packet& packet) const {
+template <int components, bool differentials>
+HWY_NOINLINE std::uint32_t Kernel<components, differentials>::spent(const Packet& packet) const {
   std::uint32_t result = 0;
   for_lanes(packet.alive, [&](int lane) {
     if (rays_[packet.ray[lane]].steps + packet.steps >= medium_.settings.max_steps) result |= 1u << lane;
@@ -201,8 +201,8 @@ HWY_NOINLINE std::uint32_t Kernel<differentials>::spent(const Packet& packet) co
 }
 
 /// Writes back the rays of some lanes, as they were before the step, and removes them from the packet.
-template <bool differentials>
-HWY_NOINLINE void Kernel<differentials>::retire(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
+template <int components, bool differentials>
+HWY_NOINLINE void Kernel<components, differentials>::retire(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
   Packet& leaving = leaving_[&packet - packets_];
   for_lanes(stop | leave, [&](int lane) {
     KernelRay& ray = rays_[packet.ray[lane]];
@@ -233,8 +233,8 @@ HWY_NOINLINE void Kernel<differentials>::retire(Packet& packet, std::uint32_t st
 }
 
 /// Records the points of some lanes.
-template <bool differentials>
-HWY_NOINLINE void Kernel<differentials>::keep_points(const Packet& packet, std::uint32_t which) {
+template <int components, bool differentials>
+HWY_NOINLINE void Kernel<components, differentials>::keep_points(const Packet& packet, std::uint32_t which) {
   alignas(64) float positions[packet_rays][4], directions[packet_rays][4];
   alignas(64) std::int32_t bricks[packet_rays][4];
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -253,8 +253,8 @@ HWY_NOINLINE void Kernel<differentials>::keep_points(const Packet& packet, std::
 }
 
 /// Moves the rays to the ends of their steps.
-template <bool differentials>
-HWY_INLINE void Kernel<differentials>::add_step(Packet& packet) {
+template <int components, bool differentials>
+HWY_INLINE void Kernel<components, differentials>::add_step(Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     store(load(packet.p_next, i), packet.p, i);
     store(load(packet.v_next, i), packet.v, i);
@@ -272,12 +272,12 @@ HWY_INLINE void Kernel<differentials>::add_step(Packet& packet) {
 }
 
 /// Takes a step, and takes out the rays that it ends, as they were before it.
-template <bool differentials>
-HWY_NOINLINE void Kernel<differentials>::step(Packet& packet) {
+template <int components, bool differentials>
+HWY_NOINLINE void Kernel<components, differentials>::step(Packet& packet) {
   find_times(medium_, packet);
   std::uint32_t stop = too_short(medium_, packet);
-  take_step<differentials>(medium_, packet);
-  samples_ += hwy::PopCount(packet.alive) * std::uint64_t{Composition::kicks};
+  take_step<components, differentials>(medium_, packet);
+  samples_ += hwy::PopCount(packet.alive) * static_cast<unsigned>(medium_.method.kicks);
   const std::uint32_t staying = medium_.adaptive ? control_steps<differentials>(medium_, packet) : 0;
   packet.lands = 0;
   std::uint32_t leave = 0;
@@ -303,8 +303,8 @@ HWY_NOINLINE void Kernel<differentials>::step(Packet& packet) {
 }
 
 /// Repeats the step that leaves the extent, with the length that ends on its face.
-template <bool differentials>
-HWY_NOINLINE void Kernel<differentials>::land(Packet& packet) {
+template <int components, bool differentials>
+HWY_NOINLINE void Kernel<components, differentials>::land(Packet& packet) {
   packet.vectors = packet_rays / lanes;
   for (int lane = static_cast<int>(hwy::PopCount(packet.alive)); lane < packet_rays; ++lane)
     copy_end(packet, 0, packet, lane);
@@ -312,14 +312,14 @@ HWY_NOINLINE void Kernel<differentials>::land(Packet& packet) {
   FaceLanding landing;
   aim_along_chord(medium_, packet, landing);
   aim_along_path(medium_, packet, landing);
-  take_step<differentials>(medium_, packet);
+  take_step<components, differentials>(medium_, packet);
   move_to_faces(medium_, packet, landing);
   arrive(packet, landing);
 }
 
 /// Writes back the rays, which are on the extent's faces.
-template <bool differentials>
-void Kernel<differentials>::arrive(Packet& packet, const FaceLanding& landing) {
+template <int components, bool differentials>
+void Kernel<components, differentials>::arrive(Packet& packet, const FaceLanding& landing) {
   for_lanes(packet.alive, [&](int lane) {
     KernelRay& ray = rays_[packet.ray[lane]];
     for (int axis = 0; axis < 3; ++axis) {
@@ -331,13 +331,13 @@ void Kernel<differentials>::arrive(Packet& packet, const FaceLanding& landing) {
     ray.length += double{packet.time[lane]};
     ray.log_radiance_scale += packet.change_of_step[lane];
     ++ray.steps;
-    samples_ += Composition::kicks;
+    samples_ += static_cast<unsigned>(medium_.method.kicks);
   });
   packet.alive = 0;
 }
 
-template <bool differentials>
-std::uint64_t Kernel<differentials>::run() {
+template <int components, bool differentials>
+std::uint64_t Kernel<components, differentials>::run() {
   for (Packet& packet : packets_) fill(packet);
   for (bool busy = true; busy;) {
     busy = false;
@@ -354,8 +354,15 @@ std::uint64_t Kernel<differentials>::run() {
   return samples_;
 }
 
+template <int components>
+std::uint64_t trace_components(const PacketMedium& medium, KernelRays& batch) {
+  return batch.differentials.empty() ? Kernel<components, false>(medium, batch).run()
+                                     : Kernel<components, true>(medium, batch).run();
+}
+
 std::uint64_t trace(const PacketMedium& medium, KernelRays& batch) {
-  return batch.differentials.empty() ? Kernel<false>(medium, batch).run() : Kernel<true>(medium, batch).run();
+  return medium.field.is_symmetric() ? trace_components<TensorBrick::symmetric>(medium, batch)
+                                     : trace_components<TensorBrick::general>(medium, batch);
 }
 
 #endif

@@ -1,6 +1,7 @@
 #pragma once
 /// @file tracing/kernels/packet_kernel.h
-/// Traces many rays at once inside a cubic field, by `splitting4`: the default. Steps are those of scalar_tracer.h, in
+/// Traces many rays at once inside a cubic field, by `splitting4`: the default. (The same code has `splitting` with
+/// steps of a given length, which probes use.) Steps are those of scalar_tracer.h, in
 /// single precision and in the widest vectors of the processor. docs/dev/performance_notes.md explains the method.
 /// The code for vectors is in the headers *-inl.h, which are compiled once for each instruction set: a step is in
 /// packet_step-inl.h, the tensor at a point in packet_splines-inl.h.
@@ -47,8 +48,9 @@ struct KernelRays {
 using MeetsSurface = std::function<bool(const Eigen::Vector3d& from, const Eigen::Vector3d& to)>;
 
 struct KernelSettings {
-  float step = 0;       ///< Voxels; 0: automatic.
-  float tolerance = 0;  ///< Of automatic steps, voxels.
+  bool is_splitting = false;  ///< Whether the method is `splitting`, whose `step` must be given.
+  float step = 0;             ///< Voxels; 0: automatic.
+  float tolerance = 0;        ///< Of automatic steps, voxels.
   std::uint32_t max_steps = 0;
   float max_length = 0;          ///< World units; limit of the whole path, `KernelRay::length` included.
   MeetsSurface meets_surface;    ///< Null if there are no surfaces within the field.

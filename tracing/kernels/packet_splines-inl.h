@@ -216,20 +216,12 @@ HWY_INLINE Slopes spline_slopes(const float* first, const SplineWeights& weights
           along_z(four_of<components>(by_y), along, lane), along_z(values, weights.slope[2], lane)};
 }
 
-/// Stores the stored component c of the tensors of a vector.
-template <int components>
-HWY_INLINE void store_component(F value, int c, PerRay (&tensor)[8], int at) {
-  for (int i = 0; i < 8; ++i)
-    if (TensorBrick::stored_component(components, i) == c) store(value, tensor[i], at);
-}
-
-/// The same of components c and following, of which a row holds those of a lane (or two lanes: see row_of).
+/// Stores components c and following of the tensors of a vector, of which a row holds those of a lane (or two lanes:
+/// see row_of).
 template <int components>
 HWY_INLINE void store_rows(F (&rows)[eight_lanes], int c, PerRay (&tensor)[8], int at) {
   transpose_rows(rows);
-#pragma GCC unroll 8
-  for (int row = 0; row < std::min(eight_lanes, components - c); ++row)
-    store_component<components>(rows[row], c + row, tensor, at);
+  for (int row = 0; row < std::min(eight_lanes, components - c); ++row) store(rows[row], tensor[c + row], at);
 }
 
 /// Whether all lanes of a vector are in one cell.
@@ -266,7 +258,7 @@ HWY_INLINE void sample_cell(Packet& packet, int at) {
     const F value = hn::MulAdd(
         weight(2, 0), sums[0],
         hn::MulAdd(weight(2, 1), sums[1], hn::MulAdd(weight(2, 2), sums[2], hn::Mul(weight(2, 3), sums[3]))));
-    store_component<components>(value, c, packet.tensor, at);
+    store(value, packet.tensor[c], at);
   }
 }
 
@@ -311,7 +303,7 @@ HWY_INLINE void sample_slopes(Packet& packet, int at) {
 
 /// Samples the tensors of all lanes, and, with `differentials`, their slopes.
 template <int components, bool differentials>
-HWY_NOINLINE void sample_tensors(Packet& packet) {
+HWY_INLINE void sample_tensors(Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     if constexpr (differentials)
       sample_slopes<components>(packet, i);
@@ -320,12 +312,6 @@ HWY_NOINLINE void sample_tensors(Packet& packet) {
     else
       sample_cells<components>(packet, i);
   }
-}
-
-template <bool differentials>
-HWY_INLINE void sample_tensors(const PacketMedium& medium, Packet& packet) {
-  medium.field.is_symmetric() ? sample_tensors<TensorBrick::symmetric, differentials>(packet)
-                              : sample_tensors<TensorBrick::general, differentials>(packet);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

@@ -21,7 +21,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-// Template argument `differentials`: whether rays have differentials.
+// Template arguments: `components`: those of a tensor that the field stores. `differentials`: whether rays have
+// differentials.
 
 // The length of a step.
 
@@ -149,11 +150,12 @@ HWY_INLINE F deviator_norm(const Tensor& T, F factor) {
 }
 
 /// Sets packet.v_next and packet.change_of_step of the lanes of `which`, whose kicks are too strong for the series.
-static HWY_NOINLINE void kick_in_double(Packet& packet, const ComposedStep& step, float part, std::uint32_t which) {
+template <int components>
+HWY_NOINLINE void kick_in_double(Packet& packet, const ComposedStep& step, float part, std::uint32_t which) {
   for (; which != 0; which &= which - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(which);
     float T[9] = {}, v[3];
-    for (int i = 0; i < 8; ++i) T[i] = packet.tensor[i][lane];
+    for (int i = 0; i < 8; ++i) T[i] = packet.tensor[TensorBrick::stored_component(components, i)][lane];
     for (int axis = 0; axis < 3; ++axis) v[axis] = step.v[axis][lane];
     const StrongKick kick = strong_kick(T, part * packet.time[lane] * packet.kick[lane], v);
     for (int axis = 0; axis < 3; ++axis) packet.v_next[axis][lane] = kick.direction[axis];
@@ -165,7 +167,7 @@ static HWY_NOINLINE void kick_in_double(Packet& packet, const ComposedStep& step
 /// results are stored, in packet.v_next and packet.change_of_step: a returned value would pass through memory in halves
 /// of vectors, which stalls the processor.
 /// @param size  ‖factor · T‖, or an upper bound of it.
-template <bool differentials>
+template <int components, bool differentials>
 HWY_INLINE void bend(Packet& packet, const ComposedStep& step, const Tensor& T, const F3& v, float part, F factor,
                      F size, int at) {
   int terms = 2;
@@ -195,7 +197,8 @@ HWY_INLINE void bend(Packet& packet, const ComposedStep& step, const Tensor& T, 
     const F change = hn::MulAdd(factor, hn::Add(T.c[0], T.c[4]), hn::Mul(set(-1.5f), log_squared));
     store(change, packet.change_of_step, at);
     store(mul(scale, sum), packet.v_next, at);
-    if (HWY_UNLIKELY(!hn::AllTrue(floats, fits))) kick_in_double(packet, step, part, to_bits(hn::Not(fits), at));
+    if (HWY_UNLIKELY(!hn::AllTrue(floats, fits)))
+      kick_in_double<components>(packet, step, part, to_bits(hn::Not(fits), at));
   }
 }
 
@@ -219,32 +222,31 @@ HWY_INLINE F3 bend_differential(const Tensor& T, const Tensor& dT, const F3& v, 
 }
 
 /// Change of the tensor if the position changes by dp, in index space.
+template <int components>
 HWY_INLINE Tensor tensor_along(const PacketMedium& medium, const Packet& packet, const F3& dp, int at) {
   // The tensor does not change along axes of a single voxel.
   const F3 along{hn::Mul(dp.x, set(medium.slope[0])), hn::Mul(dp.y, set(medium.slope[1])),
                  hn::Mul(dp.z, set(medium.slope[2]))};
-  Tensor change;
-  for (int i = 0; i < 8; ++i)
-    change.c[i] =
-        dot(along, {load(packet.slopes[0][i], at), load(packet.slopes[1][i], at), load(packet.slopes[2][i], at)});
-  return change;
+  return tensor_of<components>([&](int i) HWY_ATTR {
+    return dot(along, {load(packet.slopes[0][i], at), load(packet.slopes[1][i], at), load(packet.slopes[2][i], at)});
+  });
 }
 
 /// Kicks the rays with the tensors as last sampled, for the part `part` of the step.
-template <bool differentials>
+template <int components, bool differentials>
 HWY_INLINE void kick(const PacketMedium& medium, Packet& packet, double part, ComposedStep& step) {
   const float single = static_cast<float>(part);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F factor = hn::Mul(hn::Mul(set(single), load(packet.time, i)), load(packet.kick, i));
-    const Tensor T = load_tensor(packet, i);
+    const Tensor T = tensor_of<components>([&](int c) HWY_ATTR { return load(packet.tensor[c], i); });
     const F3 before = load(step.v, i);
     F size = load(packet.reach, i);
     if (HWY_UNLIKELY(!(packet.greatest_reach <= strongest_kick)))
       size = hn::IfThenElse(hn::Le(size, set(strongest_kick)), size, deviator_norm(T, factor));
-    bend<differentials>(packet, step, T, before, single, factor, size, i);
+    bend<components, differentials>(packet, step, T, before, single, factor, size, i);
     if constexpr (differentials) {
       for (int k = 0; k < 2; ++k) {
-        const Tensor dT = tensor_along(medium, packet, load(step.dp[k], i), i);
+        const Tensor dT = tensor_along<components>(medium, packet, load(step.dp[k], i), i);
         store(bend_differential(T, dT, before, load(step.dv[k], i), factor, size), step.dv[k], i);
       }
     } else {
@@ -257,12 +259,12 @@ HWY_INLINE void kick(const PacketMedium& medium, Packet& packet, double part, Co
 // The step.
 
 template <bool differentials>
-HWY_INLINE void begin_step(const Packet& packet, ComposedStep& step) {
+HWY_INLINE void begin_step(const PacketMedium& medium, const Packet& packet, ComposedStep& step) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F3 v = load(packet.v, i);
     store(zeros(), step.ahead, i);
     store(v, step.v, i);
-    store(mul(set(static_cast<float>(splitting4_method.error[0])), v), step.error, i);
+    store(mul(set(static_cast<float>(medium.method.error[0])), v), step.error, i);
     store(hn::Zero(floats), step.change, i);
     if constexpr (differentials)
       for (int k = 0; k < 2; ++k) {
@@ -307,23 +309,23 @@ HWY_INLINE void end_step(const PacketMedium& medium, Packet& packet, const Compo
 }
 
 /// Takes a step of length `time`. May move lanes to other bricks.
-template <bool differentials>
+template <int components, bool differentials>
 HWY_NOINLINE void take_step(const PacketMedium& medium, Packet& packet) {
   ComposedStep step;
-  begin_step<differentials>(packet, step);
+  begin_step<differentials>(medium, packet, step);
   bool near_surface = false;  // In any brick that is sampled.
-  for (int n = 0; n < Composition::kicks; ++n) {
-    drift<differentials>(medium, packet, splitting4_method.drift[n], step);
+  for (int n = 0; n < medium.method.kicks; ++n) {
+    drift<differentials>(medium, packet, medium.method.drift[n], step);
     locate(medium, packet, [&](int i) HWY_ATTR { return add(load(packet.p, i), load(step.ahead, i)); });
     near_surface |= packet.near_surface;
-    sample_tensors<differentials>(medium, packet);
-    kick<differentials>(medium, packet, splitting4_method.kick[n], step);
-    const F weight = set(static_cast<float>(splitting4_method.error[n + 1]));
+    sample_tensors<components, differentials>(packet);
+    kick<components, differentials>(medium, packet, medium.method.kick[n], step);
+    const F weight = set(static_cast<float>(medium.method.error[n + 1]));
     for (int i = 0; i < packet.vectors * lanes; i += lanes)
       store(mul_add(weight, load(step.v, i), load(step.error, i)), step.error, i);
   }
   packet.near_surface |= near_surface;
-  drift<differentials>(medium, packet, splitting4_method.drift[Composition::kicks], step);
+  drift<differentials>(medium, packet, medium.method.drift[medium.method.kicks], step);
   end_step<differentials>(medium, packet, step);
 }
 

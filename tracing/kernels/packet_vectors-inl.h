@@ -81,9 +81,11 @@ HWY_INLINE std::uint32_t to_bits(Mask mask, int at) {
 /// The bits of a vector's lanes, given those of the packet.
 HWY_INLINE std::uint32_t bits_of_vector(std::uint32_t packet, int at) { return packet >> at & ((1u << lanes) - 1); }
 
-HWY_INLINE Tensor load_tensor(const Packet& packet, int at) {
+/// The tensor whose stored component i is `stored(i)`.
+template <int components, class Stored>
+HWY_INLINE Tensor tensor_of(const Stored& stored) {
   Tensor T;
-  for (int i = 0; i < 8; ++i) T.c[i] = load(packet.tensor[i], at);
+  for (int i = 0; i < 8; ++i) T.c[i] = stored(TensorBrick::stored_component(components, i));
   return T;
 }
 

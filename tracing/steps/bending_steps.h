@@ -1,6 +1,6 @@
 #pragma once
 /// @file tracing/steps/bending_steps.h
-/// One step along a bent ray by each of the methods. A part of scalar_tracer.h.
+/// One step along a bent ray by each of the methods, in double precision.
 
 #include <array>
 #include <cmath>
@@ -128,13 +128,13 @@ State<N> splitting4(RayMedium<N>& medium, const State<N>& from, double h, State<
   State<N> ray = from;
   error.P = h * method.error[0] * ray.V;
   error.V.setZero();
-  for (int i = 0; i < Composition::kicks; ++i) {
+  for (int i = 0; i < method.kicks; ++i) {
     ray.P += h * method.drift[i] * ray.V;
     medium.sample(ray.P);
     kick(medium, h * method.kick[i] * medium.strength, ray);
     error.P += h * method.error[i + 1] * ray.V;
   }
-  ray.P += h * method.drift[Composition::kicks] * ray.V;
+  ray.P += h * method.drift[method.kicks] * ray.V;
   return ray;
 }
 

@@ -10,14 +10,16 @@ namespace tensorray {
 /// partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142, 2002). Drifts and kicks
 /// alternate, and begin and end with a drift. Negative ones are small.
 struct Composition {
-  static constexpr int kicks = 6;
+  static constexpr int most_kicks = 6;
 
-  double drift[kicks + 1], kick[kicks];
+  int kicks;
+  double longest_kick;
+  double drift[most_kicks + 1], kick[most_kicks];
 
   /// The error estimate is the difference between the way along the drifts and that by Simpson's rule, from the
   /// directions at the beginning, in the middle and at the end: h Σ_j error[j] V_j. It falls with h^3.5 or faster and
   /// is ten times the error of the step or more.
-  double error[kicks + 1];
+  double error[most_kicks + 1];
 };
 
 namespace composition_detail {
@@ -28,13 +30,16 @@ constexpr double b1 = 0.209515106613362, b2 = -0.143851773179818, b3 = 0.5 - (b1
 
 inline constexpr Composition splitting4_method = [] {
   using namespace composition_detail;
-  Composition m{{a1, a2, a3, a4, a3, a2, a1}, {b1, b2, b3, b3, b2, b1}, {}};
-  for (int i = 0; i <= Composition::kicks; ++i) m.error[i] = m.drift[i];
+  Composition m{6, b3, {a1, a2, a3, a4, a3, a2, a1}, {b1, b2, b3, b3, b2, b1}, {}};
+  for (int i = 0; i <= m.kicks; ++i) m.error[i] = m.drift[i];
   m.error[0] -= 1.0 / 6;
-  m.error[Composition::kicks / 2] -= 4.0 / 6;
-  m.error[Composition::kicks] -= 1.0 / 6;
+  m.error[m.kicks / 2] -= 4.0 / 6;
+  m.error[m.kicks] -= 1.0 / 6;
   return m;
 }();
+
+/// `splitting`, as packets take it: without an error estimate.
+inline constexpr Composition splitting_method{1, 1, {0.5, 0.5}, {1}, {}};
 
 /// Number of pieces into which a recorded step is divided. Each is one voxel long or shorter. @param length  Voxels.
 inline int pieces_of(double length) { return length > 1 ? static_cast<int>(std::ceil(length - 1e-3)) : 1; }

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tracing/steps/runge_kutta.h
-/// Coefficients of the Runge–Kutta methods, for both tracers.
+/// Coefficients of the Runge–Kutta methods.
 
 #include "tracing/bending/bending.h"
 

@@ -42,6 +42,7 @@ bool meets_surface(const Geometry& geometry, const Eigen::Vector3d& from, const 
 
 KernelSettings kernel_settings(const TensorField& field, const Geometry& geometry, const BendingSettings& settings) {
   KernelSettings result;
+  result.is_splitting = settings.method == BendingMethod::splitting;
   result.step = static_cast<float>(settings.step);
   result.tolerance = static_cast<float>(settings.tolerance);
   result.max_steps = static_cast<std::uint32_t>(settings.max_steps);
@@ -224,8 +225,11 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
 
 bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                       RayBatch& batch, RayRecord* records) {
-  if (!field.is_cubic() || settings.method != BendingMethod::splitting4 || packets::lane_count() == 1) return false;
-  if (settings.step == 0 && settings.tolerance < least_tolerance) return false;
+  const bool is_given = settings.step > 0;
+  const bool fits = settings.method == BendingMethod::splitting4
+                        ? is_given || settings.tolerance >= least_tolerance
+                        : settings.method == BendingMethod::splitting && is_given;
+  if (!fits || !field.is_cubic() || packets::lane_count() == 1) return false;
   if (batch.differentials.empty())
     trace_rays<1>(field, geometry, settings, batch, records);
   else

@@ -25,7 +25,7 @@ TensorField uneven_field(const Vector3i& first, const Vector3i& last, bool symme
   to_world.linear() =
       Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()).toRotationMatrix() * Vector3d(0.5, 1, 2).asDiagonal();
   to_world.translation() = Vector3d(10, -20, 30);
-  TensorGrid grid = dense_grid({first, last}, to_world, [](const Vector3i& at) -> Matrix3d {
+  TensorGrid grid = dense_grid({first, last}, to_world, [&](const Vector3i& at) -> Matrix3d {
     const Matrix3d T = Matrix3d::NullaryExpr([&](Eigen::Index row, Eigen::Index column) {
       return std::sin(0.9 * at.x() + 1.7 * static_cast<double>(row)) +
              std::cos(0.6 * at.y() - 1.1 * at.z() + 2.3 * static_cast<double>(column));
