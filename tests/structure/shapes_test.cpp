@@ -129,7 +129,6 @@ TEST(Structure, ClassesHaveAboutADozenMembers) {
       {"WavelengthTracer", 16},  // The arrays of a batch of vertices, used again for each.
       {"Pages", 16},             // The state between two threads, under one lock.
       {"Rendering", 14},         // What all stages of one picture read.
-      {"Leader", 14},            // The state of a job on all ranks.
   };
   constexpr std::size_t most = 13;
   for (const std::string& file : files())
