@@ -206,7 +206,7 @@ LensSettings LoadedLens::trace_settings(const Scene& scene) const {
   return settings;
 }
 
-/// Draws the light of one depth. Of a team, process 0 has the picture.
+/// Draws the light of one depth. Of ranks, the root has the picture.
 void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const Progress& progress,
                              LensPictures& all) const {
   const int channels = static_cast<int>(scene.bands.size());

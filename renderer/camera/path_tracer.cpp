@@ -79,8 +79,7 @@ class Rendering {
         height_(camera.resolution.y()),
         columns_((width_ + tile_size - 1) / tile_size),
         tiles_(static_cast<std::size_t>(columns_) * ((height_ + tile_size - 1) / tile_size)),
-        light_values_(scene.colors.bands() + 3 * static_cast<std::size_t>(scene.layers())),
-        batch_samples_(scene.region ? bent_batch : straight_batch) {
+        light_values_(scene.colors.bands() + 3 * static_cast<std::size_t>(scene.layers())) {
     for (std::size_t number = 0; number < tiles_; ++number)
       if (job.has(number)) lists_.part.push_back(number);
   }
@@ -126,8 +125,7 @@ class Rendering {
   const int width_, height_, columns_;  ///< Columns of tiles.
   const std::size_t tiles_;
   const std::size_t light_values_;  ///< For each pixel.
-  const std::size_t batch_samples_;
-  double floor_ = 0;  ///< Least luminance to which errors are compared.
+  double floor_ = 0;                ///< Least luminance to which errors are compared.
   Clock::time_point start_ = Clock::now();
   TileLists lists_;
   std::uint64_t total_samples_ = 0;
@@ -264,12 +262,13 @@ bool Rendering::gather_tiles() {
 bool Rendering::extend(std::size_t number, Batch& batch) {
   Tile tile = load(number);
   const int before = tile.samples(), more = next_samples(before), after = before + more;
+  const std::size_t batch_samples = scene_.region ? bent_batch : straight_batch;
   for (int y = 0; y < tile.height; ++y)
     for (int x = 0; x < tile.width; ++x) {
       if (tile.pixel(x, y).done != 0) continue;
       for (int sample = before; sample < after; ++sample) {
         add_ray(tile.left + x, tile.top + y, sample, batch);
-        if (batch.rays.size() == batch_samples_) shade(tile, before, after, batch);
+        if (batch.rays.size() == batch_samples) shade(tile, before, after, batch);
       }
     }
   shade(tile, before, after, batch);

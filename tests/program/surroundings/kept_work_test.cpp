@@ -224,7 +224,7 @@ TEST_F(KeptWork, AFullDiskLeavesTheOldCheckpoint) {
 
 /// Shards refine their own parts. What the whole picture needs more, or less, is found where they are merged.
 TEST_F(KeptWork, ShardsOfABoundedErrorMergeToTheSameFiles) {
-  make(plate_scene(R"({"type": "photon_distribution", "density": {"error": 0.2}})"));
+  make(plate_scene(R"({"type": "photon_distribution", "density": {"error": 0.5}})", 5000));
   make_shards(2);
   run_well(merge({"1.shard", "2.shard"}));
   expect_same("a");
@@ -233,7 +233,7 @@ TEST_F(KeptWork, ShardsOfABoundedErrorMergeToTheSameFiles) {
 /// Files beside the picture, which the scene of the shards asks for.
 TEST_F(KeptWork, ShardsOfPhotonsMergeToTheSameFiles) {
   for (const std::string density : {"mesh", "histogram"}) {
-    make(plate_scene(fmt::format(R"({{"type": "photon_distribution", "density": {{"kind": "{}"}}}})", density)));
+    make(plate_scene(fmt::format(R"({{"type": "photon_distribution", "density": {{"kind": "{}"}}}})", density), 4000));
     run_well({"render", "scene.json", "-q", "-o", "whole.vtp", "-o", "whole.fluence.vdb"});
     for (int i = 1; i <= 2; ++i)
       run_well({"render", "scene.json", "-q", "--shard", fmt::format("{}/2", i), "-o", shard(i), "--set",
