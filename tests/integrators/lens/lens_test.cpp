@@ -236,7 +236,7 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
       };
       return draw_lens(light, bands, radiance, 1, true, Progress());
     };
-    constexpr int many = 128;
+    constexpr int many = 256;
     std::vector<double> each;
     for (int i = 0; i < many; ++i) each.push_back(-0.1 + 0.2 * (i + 0.5) / many);
     const LensPicture continuum = seen({-0.1, 0.1}, true, 8), single = seen(each, false, many);

@@ -299,7 +299,7 @@ TEST(FlowMap, ConvergesWithItsTolerance) {
     settings.tolerance = tolerance;
     return caustic_of(bench, map_of(bench, settings)).irradiance.values;
   };
-  const std::vector<double> exact = light(0.005);
+  const std::vector<double> exact = light(0.002);
   std::vector<double> errors;
   for (const double tolerance : {0.8, 0.2, 0.05}) {
     const std::vector<double> values = light(tolerance);
