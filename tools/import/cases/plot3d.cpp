@@ -29,7 +29,8 @@ void require_file(const Path& path) {
 
 vtkStructuredGrid& update(vtkMultiBlockPLOT3DReader& reader, const VtkMessages& messages, const Path& path) {
   reader.Update();
-  messages.throw_error(path);
+  if (const std::string& error = messages.first_error(); !error.empty())
+    fail(path, "is cut off, or no such file of PLOT3D: " + error);
   const unsigned int blocks = reader.GetOutput()->GetNumberOfBlocks();
   if (blocks > 1) fail(path, "has " + std::to_string(blocks) + " blocks; write the one that matters alone");
   auto* const grid = blocks == 1 ? vtkStructuredGrid::SafeDownCast(reader.GetOutput()->GetBlock(0)) : nullptr;
