@@ -7,6 +7,88 @@ namespace {
 
 using namespace test;
 
+TEST_F(Import, NotchWhoseMidSideNodesHoldNothing) {
+  const std::string folder = data_file("notch_stress");
+  SKIP_WITHOUT(folder);
+  const auto arguments = [&](const char* file) {
+    return Arguments{folder + file, "--array", "Nodal Stress", "--order", "vtk", "--voxel-size", "0.002"};
+  };
+  const json notch = import(arguments("/notch_stress.vtk"), "notch");
+  // On the mesh the eigenvalues reach from -3.402e5 to 8.1078e6. No warning means that the grid has 95% of that.
+  EXPECT_EQ(imported_.error, "");
+  EXPECT_GT(at(notch, "eigenvalues", "real_max"), 0.94 * 8.1078e6);
+  EXPECT_LE(at(notch, "eigenvalues", "real_max"), 8.1078e6);
+  EXPECT_GE(at(notch, "eigenvalues", "real_min"), -3.4021e5);
+  EXPECT_EQ(notch["asymmetry"], 0);
+  EXPECT_EQ(notch["name"], "Nodal Stress");
+  expect_extent(notch, Vector3d::Zero(), Vector3d(0.4, 0.1, 0.01), 0.004);
+  import(arguments("/notch_stress_fixed.vtk"), "fixed");
+  expect_same(field("notch"), field("fixed"));
+}
+
+TEST_F(Import, BrainWithItsBackgroundNotANumber) {
+  const std::string file = data_file("nan/brain_nan_background.vti");
+  SKIP_WITHOUT(file);
+  const json brain = import({file}, "brain");
+  EXPECT_EQ(brain["name"], "diffusion_tensor");
+  EXPECT_EQ(brain["active_voxels"], 93524);
+  EXPECT_EQ(brain["non_finite_voxels"], 0);
+  EXPECT_NE(imported_.out.find("367276 not finite"), std::string::npos) << imported_.out;
+  EXPECT_NEAR(at(brain, "eigenvalues", "negative_fraction") * 93524, 864, 0.01);
+}
+
+TEST_F(Import, CarotidAwayFromTheOrigin) {
+  const std::string file = data_file("carotid/carotid.vtk");
+  SKIP_WITHOUT(file);
+  const json flow = import({file, "--gradient-of", "vectors"}, "flow");
+  EXPECT_EQ(flow["active_voxels"], 76 * 49 * 45);
+  expect_extent(flow, {100, 80, 1}, {175, 128, 45}, 1e-9);
+  float least = 0, greatest = 0;
+  for_each_voxel(field("flow"), [&](const Vector3i&, const Eigen::Matrix3f& gradient) {
+    least = std::min(least, gradient.minCoeff());
+    greatest = std::max(greatest, gradient.maxCoeff());
+  });
+  EXPECT_NEAR(least, -15.9, 0.05);
+  EXPECT_NEAR(greatest, 15.4, 0.05);
+  const json strain =
+      import({file, "--strain-of", "vectors", "--bounds", "110", "120", "90", "100", "5", "8"}, "strain");
+  EXPECT_LT(strain["asymmetry"].get<double>(), 1e-7);
+  EXPECT_EQ(strain["active_voxels"], 11 * 11 * 4);
+  expect_extent(strain, {110, 90, 5}, {120, 100, 8}, 1e-9);
+}
+
+TEST_F(Import, EightTensorsOfOneCell) {
+  const std::string file = data_file("vtk_tensors/tensors.vtk");
+  SKIP_WITHOUT(file);
+  const json eight = import({file, "--resolution", "2"}, "eight");
+  EXPECT_EQ(eight["active_voxels"], 8);
+  std::map<std::array<int, 3>, Matrix3d> tensors;
+  for_each_voxel(field("eight"), [&](const Vector3i& index, const Eigen::Matrix3f& tensor) {
+    tensors[{index.x(), index.y(), index.z()}] = tensor.cast<double>();
+  });
+  Matrix3d dense;
+  dense << 2, 1, 1, 1, 2, 1, 1, 1, 3;
+  EXPECT_LT((tensors[{0, 0, 0}] - Matrix3d::Identity()).norm(), 1e-6);
+  EXPECT_LT((tensors[{1, 0, 0}] - Matrix3d(Vector3d(-2, -2, 3).asDiagonal())).norm(), 1e-6);
+  EXPECT_LT((tensors[{1, 1, 0}] - dense).norm(), 1e-6);
+  EXPECT_LT((tensors[{1, 1, 1}]).norm(), 1e-6);
+}
+
+TEST_F(Import, PointLoadIsBoussinesqs) {
+  const std::string file = data_file("pointload/pointload_32.vti");
+  SKIP_WITHOUT(file);
+  const json load = import({file}, "load");
+  EXPECT_EQ(load["active_voxels"], 32 * 32 * 32);
+  expect_extent(load, {-10, -10, -10}, {10, 10, 10}, 1e-9);
+  const TensorGrid grid = field("load");
+  for_each_voxel(grid, [&](const Vector3i& index, const Eigen::Matrix3f& stress) {
+    const Vector3d r = grid.to_world * index.cast<double>() - Vector3d(0, 0, 10);
+    const double pressed = 3 * 100 / (2 * pi) * std::pow(r.z(), 3) / std::pow(r.norm(), 5);
+    ASSERT_NEAR(stress(2, 2), pressed, 1e-6 * (1 + std::abs(pressed)));  // r.z() <= 0: pressure is negative.
+    ASSERT_NEAR(stress(0, 2) * r.z(), pressed * r.x(), 1e-5 * (1 + std::abs(pressed)));
+  });
+}
+
 TEST_F(Import, BrainInItsObliqueAxes) {
   const std::string file = data_file("brain_dti/tensorLAS.nii.gz");
   SKIP_WITHOUT(file);
