@@ -1,5 +1,6 @@
 // Importing files of other programs: the whole way, and what the program reports of it. tests/import has the readers.
 
+#include "base/constants.h"
 #include "tests/program/import_support.h"
 
 namespace tensorray {
