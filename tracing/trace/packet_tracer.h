@@ -13,8 +13,8 @@ namespace tensorray {
 
 /// The same as `trace`.
 /// @param records  Empty, one for each ray; or null.
-/// @return false, with the batch unchanged, if packets cannot trace it: they have only `splitting4` in cubic fields,
-/// and no automatic steps with a tolerance below 1e-5.
+/// @return false, with the batch unchanged, if packets cannot trace it: they have `splitting4` in cubic fields,
+/// `splitting` with a given step there, and no automatic steps with a tolerance below 1e-5.
 bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                       RayBatch& batch, RayRecord* records);
 
