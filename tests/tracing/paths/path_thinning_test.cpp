@@ -35,7 +35,8 @@ Traced trace_both(const TensorField& field, const Vector3d& index, double flexib
   for (const double sign : {1.0, -1.0}) {
     RayBatch batch;
     batch.add(field.to_world() * index, sign * Vector3d(0.3, -0.2, 1).normalized(), sign * flexibility);
-    trace(field, geometry, {}, batch, sign > 0 ? &traced.on : &traced.back);
+    const BendingSettings settings = settings_of(BendingMethod::splitting4, 0.5);  // In packets, with many points.
+    trace(field, geometry, settings, batch, sign > 0 ? &traced.on : &traced.back);
   }
   join(field, traced.back[0], traced.on[0], traced.ray);
   return traced;
