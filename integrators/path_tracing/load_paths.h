@@ -62,7 +62,7 @@ PathScene load_paths(const Scene& scene, const PathTracingDescription& settings,
 
 /// Follows the rays, counts them by channel and end, and leaves out those that do not meet the volume.
 /// @param tensors  Whether the points of paths need the tensor (PathSettings).
-/// @param team  Processes that trace them together, and all have them; null: this one is alone.
+/// @param job  Whose ranks trace them together, and all have them; null: this process is alone.
 /// @throw std::runtime_error if no path is left; Cancelled; as Ranks::all_gather.
 std::vector<Path> follow_paths(const Scene& scene, const PathScene& paths, bool tensors, Job* job,
                                const Progress& progress, Statistics& statistics);

@@ -13,7 +13,7 @@ namespace tensorray {
 /// The choices of an import that a render offers, as the options of `tensorray import`; empty: none.
 struct ImportChoices {
   std::string order, array, gradient_of, frame;
-  std::size_t memory = 0;  ///< What may be resident, in bytes; 0: without a bound.
+  std::size_t memory = 0;  ///< What the making of the field works with, bytes; 0: no field in files.
 };
 
 /// Whether a path names a file that is neither a scene nor an OpenVDB file.

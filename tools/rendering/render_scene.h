@@ -30,7 +30,7 @@ struct RunKeeping {
 struct RenderRun {
   RunKeeping keeping;
   Ranks* ranks = nullptr;            ///< Processes that render together with this one, the root; null: alone.
-  std::size_t memory = 0;            ///< What may be resident, in bytes; 0: without a bound.
+  std::size_t memory = 0;            ///< What the making of a field works with, bytes; 0: no field in files.
   unsigned threads = 0;              ///< Number of threads; 0: all.
   bool skip_existing = false;        ///< Leave out frames of which all files exist, but no checkpoint.
   bool keep_going = false;           ///< Of a sequence: a frame that fails does not end it.

@@ -50,8 +50,8 @@ struct BendingSettings {
   double max_length = std::numeric_limits<double>::infinity();
 };
 
-/// The settings with the method that `automatic` is for a field. Only `splitting4` in cubic fields is traced in
-/// packets; all else is about ten times slower.
+/// The settings with the method that `automatic` is for a field. Only `splitting4`, and `splitting` with a given step,
+/// are traced in packets, in cubic fields; all else is about ten times slower.
 BendingSettings resolved(BendingSettings settings, const TensorField& field);
 
 /// Why a ray ended. The counts are part of every render's statistics.

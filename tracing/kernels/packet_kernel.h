@@ -1,9 +1,9 @@
 #pragma once
 /// @file tracing/kernels/packet_kernel.h
 /// Traces many rays at once inside a cubic field, by `splitting4`: the default. (The same code has `splitting` with
-/// steps of a given length, which probes use.) Steps are those of scalar_tracer.h, in
-/// single precision and in the widest vectors of the processor. docs/dev/performance_notes.md explains the method.
-/// The code for vectors is in the headers *-inl.h, which are compiled once for each instruction set: a step is in
+/// steps of a given length, which the search of the automatic scale uses.) Steps are those of scalar_tracer.h, in
+/// single precision and in the widest vectors of the processor. docs/dev/performance_notes.md explains the method. The
+/// code for vectors is in the headers *-inl.h, which are compiled once for each instruction set: a step is in
 /// packet_step-inl.h, the tensor at a point in packet_splines-inl.h.
 
 #include <array>
