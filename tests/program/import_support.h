@@ -86,6 +86,13 @@ class Import : public Program {
 
 inline double at(const json& value, const char* group, const char* key) { return value[group][key].get<double>(); }
 
+inline void expect_extent(const json& field, const Vector3d& min, const Vector3d& max, double tolerance) {
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(field["world_extent"]["min"][axis].get<double>(), min[axis], tolerance) << "axis " << axis;
+    EXPECT_NEAR(field["world_extent"]["max"][axis].get<double>(), max[axis], tolerance) << "axis " << axis;
+  }
+}
+
 inline Vector3i voxels_of(const json& field) {
   Vector3i size;
   for (int axis = 0; axis < 3; ++axis)
