@@ -44,7 +44,9 @@ TEST_F(PlatePicture, WithoutAFieldItIsNeutralAndUniform) {
           most = std::max(most, value);
         }
     EXPECT_NEAR(sum, 1, 0.02) << illuminant;
-    EXPECT_LT((most - least) / sum, 1e-6) << illuminant;
+    // Light starts every 0.427 pixels. The spline of the estimate leaves 2 sinc(2.34)^4 = 4e-4 of this lattice along
+    // each axis, and the blur 2e-4 of that: 3e-7 from the darkest pixel to the brightest. Others are of rounding.
+    EXPECT_LT((most - least) / sum, 2e-6) << illuminant;
   }
 }
 
