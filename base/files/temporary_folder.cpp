@@ -12,7 +12,7 @@ namespace tensorray {
 namespace {
 
 /// Greater than the descriptors of a child's standard streams and of the shared file.
-constexpr int least_descriptor = 10;
+constexpr int min_descriptor = 10;
 
 [[noreturn]] void fail_to_make(const char* what, int reason) {
   throw std::runtime_error(std::string("no temporary ") + what + " can be made in " + temporary_files().string() +
@@ -48,7 +48,7 @@ Descriptor open_unnamed(const std::filesystem::path& folder) {
 UnnamedFile::UnnamedFile() {
   const Descriptor made = open_unnamed(temporary_files());
   if (!made.is_open()) fail_to_make("file", errno);
-  file_ = Descriptor(fcntl(made.get(), F_DUPFD_CLOEXEC, least_descriptor));
+  file_ = Descriptor(fcntl(made.get(), F_DUPFD_CLOEXEC, min_descriptor));
   if (!file_.is_open()) fail_to_make("file", errno);
 }
 

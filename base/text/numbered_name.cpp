@@ -7,7 +7,7 @@
 namespace tensorray {
 namespace {
 
-constexpr std::size_t most_digits = 2;  ///< Of a width.
+constexpr std::size_t max_digits = 2;  ///< Of a width.
 
 struct NumberSign {
   std::size_t size = 0;   ///< Characters of the sign; 0: there is none.
@@ -33,7 +33,7 @@ NumberSign hash_sign(const std::string& text, std::size_t at) {
 /// %d, %04d
 NumberSign percent_sign(const std::string& text, std::size_t at) {
   const std::size_t digits = text[at] == '%' ? digits_at(text, at + 1) : 0, end = at + 1 + digits;
-  const bool is_sign = text[at] == '%' && end < text.size() && text[end] == 'd' && digits <= most_digits &&
+  const bool is_sign = text[at] == '%' && end < text.size() && text[end] == 'd' && digits <= max_digits &&
                        (digits == 0 || text[at + 1] == '0');
   if (!is_sign) return {};
   return {digits + 2, width_at(text, at + 1, digits)};
@@ -45,7 +45,7 @@ NumberSign dollar_sign(const std::string& text, std::size_t at) {
   const std::size_t digits = digits_at(text, at + 2), end = at + 2 + digits;
   const bool is_word =
       end < text.size() && (std::isalpha(static_cast<unsigned char>(text[end])) != 0 || text[end] == '_');
-  if (is_word || digits > most_digits) return {};
+  if (is_word || digits > max_digits) return {};
   return {digits + 2, width_at(text, at + 2, digits)};
 }
 

@@ -23,11 +23,11 @@ using Eigen::Affine2d;
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-constexpr double tolerance = 0.5;              // Wanted error of landings, pixels.
-constexpr double finest_of_scatter = 0.25;     // Size of the smallest quads, pixels: gaps at tears are as wide.
-constexpr double finest_of_gather = 1;         // There, samples in torn quads are traced on their own.
-constexpr std::size_t most_starts = 1u << 14;  // The map has at most so many vertices,
-constexpr std::size_t starts_per_pixel = 2;    // plus so many for each pixel. A chaotic field could need any number.
+constexpr double tolerance = 0.5;             // Wanted error of landings, pixels.
+constexpr double finest_of_scatter = 0.25;    // Size of the smallest quads, pixels: gaps at tears are as wide.
+constexpr double finest_of_gather = 1;        // There, samples in torn quads are traced on their own.
+constexpr std::size_t max_starts = 1u << 14;  // The map has at most so many vertices,
+constexpr std::size_t starts_per_pixel = 2;   // plus so many for each pixel. A chaotic field could need any number.
 
 /// Maps pixels of the receiver along the light to coordinates in the image's plane.
 Affine2d straight_map(const Plate& receiver, const Plate& image, const Eigen::Vector3d& direction) {
@@ -95,8 +95,8 @@ FlowSettings flow_settings(const LensLight& light) {
   settings.beside = gathers(light) && light.setup.image.wraps;
   settings.job = light.settings.job;
   settings.is_kept = true;
-  settings.most_starts =
-      most_starts + starts_per_pixel * static_cast<std::size_t>(light.setup.receiver.resolution.prod());
+  settings.max_starts =
+      max_starts + starts_per_pixel * static_cast<std::size_t>(light.setup.receiver.resolution.prod());
   return settings;
 }
 

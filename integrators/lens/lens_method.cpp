@@ -21,8 +21,8 @@
 namespace tensorray {
 namespace {
 
-constexpr int overlay_cells = 16;           // Cells along the image's shorter side.
-constexpr double most_overlay_cells = 1e6;  // A limit; grids are too dense to be visible long before.
+constexpr int overlay_cells = 16;          // Cells along the image's shorter side.
+constexpr double max_overlay_cells = 1e6;  // A limit; grids are too dense to be visible long before.
 /// The light of a band is spread evenly over the points that it sees; so this step decides only how exact the colours
 /// within a fringe are. With 10 bands or more a reflectance can have any colour of Rec. 709.
 constexpr BandStep band_step{16, 12, 24};
@@ -122,7 +122,7 @@ void draw_overlay(const LensPicture& picture, const Plate& plane, Image& image) 
       seen.push_back({point.end == LensEnd::image, point.st, point.per_pixel});
     }
   const Eigen::Array2d cells =
-      (overlay_cells * plane.size / plane.size.minCoeff()).array().round().min(most_overlay_cells);
+      (overlay_cells * plane.size / plane.size.minCoeff()).array().round().min(max_overlay_cells);
   GridLines lines;
   lines.cells = cells.cast<int>();
   lines.width = 1;

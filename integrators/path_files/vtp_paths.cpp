@@ -63,7 +63,7 @@ DataArray per_path(const std::vector<Path>& paths, const Get& get) {
 
 void add_axes(const std::vector<Path>& paths, const std::vector<std::size_t>& firsts, PolylineData& data) {
   CrossSectionSettings bare;
-  bare.least_radius = 1e-300;  // Becomes zero in single precision.
+  bare.min_radius = 1e-300;  // Becomes zero in single precision.
   std::vector<float> majors(3 * firsts.back()), minors(3 * firsts.back());
   tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
     float *major = majors.data() + 3 * firsts[i], *minor = minors.data() + 3 * firsts[i];

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double shown_min = 380, shown_max = 730;  // nm: range of the light that shows the paths.
 constexpr double reference_wavelength = 550;        // nm: wavelength of the rays, unless paths show their wavelength.
-constexpr std::size_t most_paths = 2'000'000;       // A path takes some kilobytes.
+constexpr std::size_t max_paths = 2'000'000;        // A path takes some kilobytes.
 
 /// The light that shows the paths. Its white is always neutral, unlike that of the light that is bent.
 ShownLight shown_light(const ColorManagement& color, const Spectrum& light, int count) {
@@ -91,9 +91,9 @@ std::vector<LightChannel> followed(std::vector<LightChannel> channels, bool rgb,
 
 std::vector<PathSeed> seeds_of(const SeedList& list, const std::vector<LightChannel>& channels, const Beam& beam) {
   const std::size_t count = list.positions.size() * channels.size();
-  if (count > most_paths)
+  if (count > max_paths)
     throw std::invalid_argument(fmt::format("{} seeds with {} wavelengths are more than {} paths; ask for fewer",
-                                            list.positions.size(), channels.size(), most_paths));
+                                            list.positions.size(), channels.size(), max_paths));
   std::vector<PathSeed> seeds;
   seeds.reserve(count);
   for (std::size_t i = 0; i < list.positions.size(); ++i)

@@ -14,10 +14,10 @@
 namespace tensorray {
 namespace {
 
-constexpr double radius_per_spacing = 0.16;           // Neighbours then do not touch.
-constexpr double radius_per_extent = 0.01;            // Largest typical radius, in diagonals of the volume.
-constexpr double thinnest = 0.2, thickest = 3;        // In typical radii.
-constexpr std::uint64_t most_triangles = 60'000'000;  // About 6 GB with the search tree.
+constexpr double radius_per_spacing = 0.16;          // Neighbours then do not touch.
+constexpr double radius_per_extent = 0.01;           // Largest typical radius, in diagonals of the volume.
+constexpr double thinnest = 0.2, thickest = 3;       // In typical radii.
+constexpr std::uint64_t max_triangles = 60'000'000;  // About 6 GB with the search tree.
 
 /// The place of a vertex on a path: the point of the path before it, and the fraction of the distance to the next one.
 struct Place {
@@ -115,12 +115,12 @@ TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription&
                    double typical, double tolerance) {
   CrossSectionSettings sections;
   sections.scale = description.radius.scale ? *description.radius.scale : scale_for_radius(paths, typical);
-  sections.least_radius = description.radius.min.value_or(
+  sections.min_radius = description.radius.min.value_or(
       std::min(thinnest * typical, description.radius.max.value_or(std::numeric_limits<double>::max())));
   // A user who gives a scale wants true sizes.
   const double greatest = description.radius.scale ? std::numeric_limits<double>::max() : thickest * typical;
-  sections.greatest_radius = std::max(sections.least_radius, description.radius.max.value_or(greatest));
-  if (are_bare(paths)) sections.least_radius = sections.greatest_radius = typical;
+  sections.max_radius = std::max(sections.min_radius, description.radius.max.value_or(greatest));
+  if (are_bare(paths)) sections.min_radius = sections.max_radius = typical;
   std::vector<Tube> tubes(paths.size());
   tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
     const PathPoints& way = paths[i].points;
@@ -134,8 +134,8 @@ TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription&
   settings.style = tube_style(description.style);
   settings.caps = description.caps;
   settings.tolerance = tolerance;
-  settings.least_segments = 4;  // For tubes that are thinner than a pixel; there may be many.
-  settings.most_triangles = most_triangles;
+  settings.min_segments = 4;  // For tubes that are thinner than a pixel; there may be many.
+  settings.max_triangles = max_triangles;
   return make_tube_mesh(std::move(tubes), settings);
 }
 

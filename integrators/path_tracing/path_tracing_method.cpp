@@ -22,7 +22,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double most_radii = 2e5;  // Rays start 5e-7 diagonals away from a surface, which is then a tenth of a radius.
+constexpr double max_radii = 2e5;  // Rays start 5e-7 diagonals away from a surface, which is then a tenth of a radius.
 constexpr double legend_width = 0.2;    // Part of the picture's width that a chosen camera leaves free.
 constexpr double tube_tolerance = 0.2;  // Pixels: greatest distance of a tube's triangles from its surface.
 
@@ -93,7 +93,7 @@ Camera scene_camera(const Scene& scene, const ContextDescription& context, const
 void require_fine(const Scene& scene, const RadiusDescription& radius, const SurfaceScene& stage,
                   const std::vector<Path>& paths) {
   const double typical = typical_radius(radius, paths.size(), scene.field.world_box());
-  if (stage.bounds().diagonal().norm() < most_radii * typical) return;
+  if (stage.bounds().diagonal().norm() < max_radii * typical) return;
   throw SceneError(fmt::format(
       "{}: paths are too thin ({:.3g}) for the size of the scene ({:.3g}); bring lamps, obstacles and plate nearer, or "
       "raise `/integrator/radius/typical`",

@@ -66,7 +66,7 @@ FluenceSums::FluenceSums(const TensorField& field, std::vector<double> powers, b
   const double sum = std::accumulate(powers_.begin(), powers_.end(), 0.0);
   if (!(sum > 0)) throw std::invalid_argument("fluence needs light with power above zero");
   for (double& power : powers_) power /= sum;
-  greatest_power_ = *std::max_element(powers_.begin(), powers_.end());
+  max_power_ = *std::max_element(powers_.begin(), powers_.end());
 }
 
 FluenceSums::~FluenceSums() {
@@ -85,7 +85,7 @@ FluenceSums::Sum* FluenceSums::sums_of(std::uint32_t number) {
 
 void FluenceSums::add(std::size_t channel, const RayRecord& ray) {
   const std::size_t plane = bands_ ? channel : 0;
-  const double weight = (bands_ ? 1 : powers_[channel] / greatest_power_) / (edge_ * quantum_);
+  const double weight = (bands_ ? 1 : powers_[channel] / max_power_) / (edge_ * quantum_);
   // Rounds what is added so that the sum over the whole ray is exact to one quantum.
   double way = 0;
   std::uint64_t added = 0;
@@ -175,7 +175,7 @@ std::size_t FluenceSums::memory_bytes() const {
 }
 
 std::vector<ScalarGrid> FluenceSums::grids(double ray_area) const {
-  std::vector<double> weights{greatest_power_};
+  std::vector<double> weights{max_power_};
   if (bands_) weights = powers_;
   for (double& weight : weights) weight *= ray_area;
   std::vector<ScalarGrid> all{grid_of(0, weights)};

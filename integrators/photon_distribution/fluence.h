@@ -64,7 +64,7 @@ class FluenceSums {
   std::size_t planes_;  // Number of sums of a voxel.
   double edge_;         // Edge of a voxel, world units; the unit of lengths.
   double quantum_;      // Value of the last bit of a sum, in edges.
-  double greatest_power_;
+  double max_power_;
   std::vector<Eigen::Vector3i> places_;    // Positions of the blocks, in units of blocks; in order.
   BrickIndex index_;                       // Finds the number of the block at a position.
   std::vector<std::atomic<Sum*>> blocks_;  // 8³ sums for each plane of a block; null where no light has been.

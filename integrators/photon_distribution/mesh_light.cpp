@@ -19,8 +19,8 @@
 namespace tensorray {
 namespace {
 
-constexpr int most_refined_bands = 2048;
-constexpr double least_tolerance = 1e-3;  // Pixels; landings are single precision.
+constexpr int max_refined_bands = 2048;
+constexpr double min_tolerance = 1e-3;  // Pixels; landings are single precision.
 
 /// A picture that is made, and who makes it.
 struct MeshJob {
@@ -87,7 +87,7 @@ PlateLight draw(const Scene& scene, FlowMap map, const Sweep& sweep, Ranks* rank
 FlowMap trace(const MeshJob& job, double tolerance, const Progress& progress) {
   const Scene& scene = job.scene;
   FlowSettings settings;
-  settings.most_starts = static_cast<std::size_t>(scene.description.light.photons);
+  settings.max_starts = static_cast<std::size_t>(scene.description.light.photons);
   settings.tolerance = tolerance;
   const LightRange range = light_range(scene);
   settings.flexibilities = range.flexibilities;
@@ -114,7 +114,7 @@ PlateLight trace_and_draw(const MeshJob& job, double tolerance, const Sweep& swe
 
 /// Half the tolerance always has twice the bands.
 Sweep refined_sweep(double tolerance) {
-  return {{4 * tolerance, static_cast<int>(std::ceil(16 / tolerance)), most_refined_bands}, 4 * tolerance};
+  return {{4 * tolerance, static_cast<int>(std::ceil(16 / tolerance)), max_refined_bands}, 4 * tolerance};
 }
 
 /// What is left of the error after a change, if further ones fall as the last two did: the sum of a geometric series.
@@ -145,7 +145,7 @@ PlateLight refine(const MeshJob& job, double bound, const Progress& progress) {
     light = std::move(finer);
     label = fmt::format(" (error {:.2g}%)", 100 * error);
     if (error <= bound) return light;
-    if (!light.map.is_complete || tolerance < least_tolerance) {
+    if (!light.map.is_complete || tolerance < min_tolerance) {
       light.warnings.push_back(
           fmt::format("the picture's error is {:.2g}%, not {:.2g}%: {}", 100 * error, 100 * bound,
                       light.map.is_complete ? "positions are single precision" : "raise `light.photons`"));

@@ -12,7 +12,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double least_interval = 0.2;        // Seconds between states that are kept.
+constexpr double min_interval = 0.2;          // Seconds between states that are kept.
 constexpr double tracing_for_keeping = 20;    // Tracing takes so many times longer than keeping.
 constexpr std::uint64_t chunks_in_round = 2;  // That each rank traces before it hears from the others.
 
@@ -115,7 +115,7 @@ class PhotonParts {
 
   bool is_due() const {
     const bool is_wanted = job_.settings.show && kept_ && kept_->picture_wanted;
-    const double interval = std::max(least_interval, tracing_for_keeping * seconds_keeping_);
+    const double interval = std::max(min_interval, tracing_for_keeping * seconds_keeping_);
     return kept_ && (parts_ == 1 || kept_->is_shard) && (is_wanted || seconds_since(time_kept_) > interval);
   }
 

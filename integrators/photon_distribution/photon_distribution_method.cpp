@@ -22,11 +22,11 @@ namespace {
 /// "550nm", with as many decimals as all names need to differ; in RGB mode "red", "green", "blue".
 std::vector<std::string> band_names(const Scene& scene) {
   if (scene.description.bending.rgb) return {"red", "green", "blue"};
-  constexpr int most_decimals = 9;
+  constexpr int max_decimals = 9;
   for (int decimals = 0;; ++decimals) {
     std::vector<std::string> names;
     for (const Band& band : scene.bands) names.push_back(fmt::format("{:.{}f}nm", band.wavelength, decimals));
-    if (decimals == most_decimals || std::set<std::string>(names.begin(), names.end()).size() == names.size())
+    if (decimals == max_decimals || std::set<std::string>(names.begin(), names.end()).size() == names.size())
       return names;
   }
 }

@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::size_t fewest_ways = 6;
-constexpr double most_change = 0.01;  // Of the jacobian, as predicted for the check.
+constexpr double max_change = 0.01;  // Of the jacobian, as predicted for the check.
 
 /// Nodes for so many ways: 3 for 8, 4 for 16, 6 for 32.
 std::size_t nodes_for(std::size_t ways) { return 3 + (ways - 1) / 8; }
@@ -79,7 +79,7 @@ bool is_predictable(const BandGroup& group, const std::vector<BentRay>& ways, co
   const Vector3d off = predicted.position - check.position;
   return off.norm() <= check.tolerance * (check.position - start).norm() &&
          (predicted.direction - check.direction).norm() <= check.tolerance &&
-         std::abs(predicted.log_jacobian - std::log(check.jacobian)) <= most_change;
+         std::abs(predicted.log_jacobian - std::log(check.jacobian)) <= max_change;
 }
 
 void interpolate(const BandGroup& group, std::vector<BentRay>& ways) {

@@ -81,8 +81,8 @@ void FieldRegion::trace_radiance(std::vector<BentRay>& ways) const {
   else
     follow_groups(std::move(groups), ways);
   for (BentRay& way : ways) {
-    if (way.arrives && settings_.most_radiance_scale > 0 && !(way.radiance_scale <= settings_.most_radiance_scale)) {
-      way.radiance_scale = settings_.most_radiance_scale;
+    if (way.arrives && settings_.max_radiance_scale > 0 && !(way.radiance_scale <= settings_.max_radiance_scale)) {
+      way.radiance_scale = settings_.max_radiance_scale;
       ++limited_;
     }
     way.arrives = way.arrives && std::isfinite(way.radiance_scale);

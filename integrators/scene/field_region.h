@@ -28,7 +28,7 @@ enum class Conserve {
 struct FieldViewSettings {
   BendingSettings bending;  ///< With the scale of the field.
   Conserve conserve = Conserve::power;
-  double most_radiance_scale = 0;  ///< Greatest factor on radiance, > 0, or 0: no limit. Limited ways lose light.
+  double max_radiance_scale = 0;  ///< Greatest factor on radiance, > 0, or 0: no limit. Limited ways lose light.
   /// Flexibility of the light at a place, 0 to 1, within a band. Any thread may call it.
   std::function<double(int band, double place)> flexibility;
 };

@@ -97,7 +97,7 @@ FieldViewSettings view_settings(const Scene& scene, const ObjectScene& loaded) {
   FieldViewSettings settings;
   settings.bending = scene.bending;
   settings.conserve = loaded.settings.conserve;
-  settings.most_radiance_scale = loaded.settings.most_radiance_scale;
+  settings.max_radiance_scale = loaded.settings.max_radiance_scale;
   settings.flexibility = [flexibility = flexibility_of(scene.description.bending), &bands = loaded.lights.light.bands](
                              int band, double place) {
     const Band& each = bands[static_cast<std::size_t>(band)];
@@ -143,7 +143,7 @@ void report(const FieldRegion& region, const ObjectScene& loaded, Render& result
     result.warnings.push_back(
         fmt::format("the field increases radiance by more than `integrator.max_gain` ({:g}) on {:.2g}% of the ways "
                     "through it; the picture lacks this light",
-                    loaded.settings.most_radiance_scale,
+                    loaded.settings.max_radiance_scale,
                     100.0 * static_cast<double>(region.limited()) / static_cast<double>(statistics.positions)));
 }
 

@@ -28,8 +28,8 @@ struct PhotonsDescription {
 
 struct SceneMethodDescription {
   Conserve conserve = Conserve::power;
-  int bands_per_sample = 8;         ///< Bands that a path follows into the volume; divides `bands`.
-  double most_radiance_scale = 20;  ///< Greatest factor on radiance; 0: no limit.
+  int bands_per_sample = 8;        ///< Bands that a path follows into the volume; divides `bands`.
+  double max_radiance_scale = 20;  ///< Greatest factor on radiance; 0: no limit.
   CausticDescription caustic;
   PhotonsDescription photons;
 };
@@ -60,7 +60,7 @@ void describe(SceneMethodDescription& settings, Visitor& visit) {
   visit("conserve", settings.conserve, "scene: what light keeps in the field: a photon's power, or radiance", knob());
   visit("bands_per_sample", settings.bands_per_sample,
         "scene: bands that a sample follows into the volume; divides `bands`", between(1, 1000));
-  visit("max_gain", settings.most_radiance_scale,
+  visit("max_gain", settings.max_radiance_scale,
         "scene: greatest factor by which the field increases radiance (`conserve` power); 0: no limit", at_least(0));
   visit.section("caustic", settings.caustic,
                 "scene: the light of directional lights and points that the field throws on objects");

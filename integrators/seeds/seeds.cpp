@@ -14,7 +14,7 @@ namespace tensorray {
 namespace {
 
 constexpr double disk_distance = 0.75;  // In units of √(area / count); random packing reaches 0.83.
-constexpr std::uint64_t most_disks = 10'000'000;
+constexpr std::uint64_t max_disks = 10'000'000;
 
 void require_some(std::uint64_t count) {
   if (count == 0) throw std::invalid_argument("the count of seeds must be 1 or more");
@@ -73,7 +73,7 @@ std::vector<Eigen::Vector3d> grid_seeds(const Beam& beam, std::uint64_t count) {
 /// before no room is left, so that the loop ends.
 std::vector<Eigen::Vector3d> poisson_disk_seeds(const Beam& beam, std::uint64_t count, std::uint64_t seed) {
   require_some(count);
-  if (count > most_disks) throw std::invalid_argument("there are at most 10,000,000 Poisson disk seeds: use the grid");
+  if (count > max_disks) throw std::invalid_argument("there are at most 10,000,000 Poisson disk seeds: use the grid");
   const double distance = disk_distance * std::sqrt(area(beam.aperture) / static_cast<double>(count));
   const Eigen::AlignedBox2d box = box_of(beam.aperture);
   NeighbourGrid grid(box.min(), box.sizes(), distance);

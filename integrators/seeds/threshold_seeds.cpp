@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::uint32_t block = 1u << 16;  // Candidates that are evaluated between two checks of their number.
 constexpr std::uint32_t enough_to_give_up = 1u << 20;  // Stop after so many candidates if none is selected.
-constexpr std::uint32_t most_candidates = 1u << 26;
+constexpr std::uint32_t max_candidates = 1u << 26;
 
 /// The sequence of points among which seeds are selected.
 struct CandidateSequence {
@@ -98,7 +98,7 @@ std::vector<Eigen::Vector3d> threshold_seeds(const TensorField& field, const Eig
     throw std::invalid_argument("the box of threshold seeds does not meet the field's extent");
   std::vector<Eigen::Vector3d> seeds;
   double smallest = std::numeric_limits<double>::infinity(), largest = -smallest;
-  for (std::uint32_t first = 0; first < (seeds.empty() ? enough_to_give_up : most_candidates); first += block) {
+  for (std::uint32_t first = 0; first < (seeds.empty() ? enough_to_give_up : max_candidates); first += block) {
     const std::vector<double> values = judge(field, threshold, sequence, first);
     for (std::uint32_t i = 0; i < block; ++i) {
       if (std::isnan(values[i])) continue;

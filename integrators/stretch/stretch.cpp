@@ -24,7 +24,7 @@ double log_stretch(const Eigen::Matrix<double, 3, 2>& m) {
   return std::log(std::max(greatest, std::numeric_limits<double>::min())) / 2;
 }
 
-constexpr double most_voxels = 1 << 30;
+constexpr double max_voxels = 1 << 30;
 
 /// A lattice in the volume, with the same centre as the extent.
 struct Lattice {
@@ -38,7 +38,7 @@ Lattice make_lattice(const TensorField& field, int resolution) {
   const double spacing = extent.sizes().maxCoeff() / (resolution - 1);
   Lattice lattice;
   lattice.size = (extent.sizes() / spacing + Eigen::Vector3d::Constant(1e-6)).array().floor().cast<int>() + 1;
-  if (lattice.size.cast<double>().prod() > most_voxels)
+  if (lattice.size.cast<double>().prod() > max_voxels)
     throw std::invalid_argument("the grid would have more than 2^30 voxels: lower the resolution");
   const Eigen::Vector3d first = extent.center() - spacing / 2 * (lattice.size.cast<double>() - Eigen::Vector3d::Ones());
   lattice.to_world = field.to_world() * Eigen::Translation3d(first) * Eigen::Scaling(spacing);

@@ -62,7 +62,7 @@ void check(const TraceRequest& request) {
             "trace: positions, directions and s must be finite");
     require(std::abs(V.norm() - 1) < 1e-6, "trace: directions must not be zero");
   }
-  require(request.smooth >= 0 && request.smooth <= greatest_smoothing, "trace: smooth must be 0 to 20 voxels");
+  require(request.smooth >= 0 && request.smooth <= max_smoothing, "trace: smooth must be 0 to 20 voxels");
 }
 
 std::vector<TracedBatch> batches_of(const TraceRequest& request) {
@@ -229,7 +229,7 @@ py::dict landings(const SceneRequest& request, std::vector<double> flexibilities
       [&](const Progress& progress) {
         scene.emplace(load_request(request, read_request(request), progress));
         FlowSettings settings;
-        settings.most_starts = static_cast<std::size_t>(scene->description.light.photons);
+        settings.max_starts = static_cast<std::size_t>(scene->description.light.photons);
         settings.tolerance = tolerance;
         const LightRange range = light_range(*scene);
         settings.range = flexibilities.empty() && range.is_range;

@@ -29,8 +29,8 @@ constexpr int neighborhood = 2;  ///< Pixels in each direction that help decide 
 /// Samples that are shaded together. Where light bends, their rays fill packets; otherwise, all that is known of them
 /// should stay in the cache of the first level.
 constexpr std::size_t bent_batch = 256, straight_batch = 32;
-constexpr double round_seconds = 15;      ///< After which ranks give their tiles to the root.
-constexpr double least_luminance = 0.05;  ///< To which errors are compared; fraction of the picture's mean.
+constexpr double round_seconds = 15;    ///< After which ranks give their tiles to the root.
+constexpr double min_luminance = 0.05;  ///< To which errors are compared; fraction of the picture's mean.
 
 void require_valid(const Camera& camera, const PathTracerSettings& settings) {
   require(camera.resolution.minCoeff() >= 1, "the camera's resolution must be >= 1");
@@ -133,7 +133,7 @@ class Rendering {
 };
 
 SurfacePicture Rendering::run() {
-  if (settings_.noise_threshold > 0) floor_ = least_luminance * mean_luminance();
+  if (settings_.noise_threshold > 0) floor_ = min_luminance * mean_luminance();
   count_samples();
   do {
     lists_.gathered = Clock::now();

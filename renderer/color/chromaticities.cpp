@@ -37,10 +37,10 @@ Matrix3d rgb_to_xyz(const Chromaticities& colors) {
 }
 
 std::optional<Matrix3d> adaptation(const Vector3d& from, const Vector3d& to) {
-  constexpr double least_response = 0.01;
+  constexpr double min_response = 0.01;
   const Matrix3d cones = bradford_cones();
   const Vector3d response = (cones * from).cwiseQuotient(cones * to);
-  if (!(response.minCoeff() > least_response)) return std::nullopt;
+  if (!(response.minCoeff() > min_response)) return std::nullopt;
   return cones.inverse() * response.cwiseInverse().asDiagonal() * cones;
 }
 

@@ -35,11 +35,11 @@ Profile open_profile(const std::string& bytes, bool grey) {
 
 /// Light of white and black, as numbers that are neither must not be followed.
 void require_light(const ColorConversion& to_xyz) {
-  constexpr float most_light = 100;
+  constexpr float max_light = 100;
   float colors[8] = {0, 0, 0, 1, 1, 1, 1, 1};
   to_xyz(colors, 2);
   for (const float value : {colors[0], colors[1], colors[2], colors[4], colors[5], colors[6]})
-    if (!(std::abs(value) < most_light)) throw std::runtime_error("it is damaged");
+    if (!(std::abs(value) < max_light)) throw std::runtime_error("it is damaged");
   if (!(colors[5] > colors[1])) throw std::runtime_error("its white is not brighter than its black");
 }
 

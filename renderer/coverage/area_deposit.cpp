@@ -12,9 +12,9 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double unit = 281474976710656.0;  // 2^48: the sum for the power 1.
-constexpr double least_area = 1e-6;         // Triangles of less area, pixels² for each pixel of length, become lines.
-constexpr double greatest_sum = 1125899906842624.0;  // 2^50. If an edge may add more, too; see `integer_bits`.
-constexpr double line_points = 4;                    // Points of a line, for each pixel of its length.
+constexpr double min_area = 1e-6;           // Triangles of less area, pixels² for each pixel of length, become lines.
+constexpr double max_sum = 1125899906842624.0;  // 2^50. If an edge may add more, too; see `integer_bits`.
+constexpr double line_points = 4;               // Points of a line, for each pixel of its length.
 
 /// The nearest integer; values of opposite signs cancel.
 std::uint64_t integer(double value) {
@@ -30,7 +30,7 @@ double twice_area_of(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
 }
 
 bool is_line(const Vector2d& extent, double twice_area) {
-  return std::abs(twice_area) < least_area * std::max(1.0, extent.sum());
+  return std::abs(twice_area) < min_area * std::max(1.0, extent.sum());
 }
 
 /// Points with equal power of a triangle without area. The density along the line rises from one end of the longest
@@ -77,8 +77,8 @@ void AreaDeposit::set_plane_weights(const PlaneWeights& plane_weights) {
   if (plane_weights == plane_weights_) return;
   flush();
   plane_weights_ = plane_weights;
-  greatest_weight_ = 0;
-  for (const double share : plane_weights) greatest_weight_ = std::max(greatest_weight_, std::abs(share));
+  max_weight_ = 0;
+  for (const double share : plane_weights) max_weight_ = std::max(max_weight_, std::abs(share));
 }
 
 double AreaDeposit::triangle(const Vector2d& a, const Vector2d& b, const Vector2d& c, double power) {
@@ -89,7 +89,7 @@ double AreaDeposit::triangle(const Vector2d& a, const Vector2d& b, const Vector2
     return 0;
   }
   const double twice_area = twice_area_of(a, b, c), density = -2 * unit * power / twice_area;
-  if (!is_line(high - low, twice_area) && std::abs(density) * greatest_weight_ <= greatest_sum) return density;
+  if (!is_line(high - low, twice_area) && std::abs(density) * max_weight_ <= max_sum) return density;
   const std::vector<Vector2d> points = points_of_line(a, b, c);
   for (const Vector2d& point : points) add_point(point, power / static_cast<double>(points.size()));
   return 0;

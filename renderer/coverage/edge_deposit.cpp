@@ -16,13 +16,13 @@ using Doubles = hn::CappedTag<double, 8>;  // A lane is an edge.
 using Values = hn::VFromD<Doubles>;
 using Lanes = hn::Mask<Doubles>;
 
-constexpr std::size_t most_lanes = 8;
+constexpr std::size_t max_lanes = 8;
 
 /// The parts of edges in one row of pixels: from column `left` to `right`, with the density times the height.
 struct Spans {
-  alignas(64) double left[most_lanes], right[most_lanes], weight[most_lanes];
-  alignas(64) double first[most_lanes], second[most_lanes];  // What is covered of the first two columns.
-  alignas(64) std::int64_t place[most_lanes];                // Of the first column.
+  alignas(64) double left[max_lanes], right[max_lanes], weight[max_lanes];
+  alignas(64) double first[max_lanes], second[max_lanes];  // What is covered of the first two columns.
+  alignas(64) std::int64_t place[max_lanes];               // Of the first column.
 };
 
 using Planes = hn::CappedTag<double, DepositPlanes::count>;

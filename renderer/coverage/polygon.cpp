@@ -14,10 +14,10 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr std::size_t most_concave_corners = 10000;  // Time grows with their square.
+constexpr std::size_t max_concave_corners = 10000;  // Time grows with their square.
 
 /// How often all corners may be searched without an ear, which takes the square of their number.
-int most_searches(std::size_t corners) {
+int max_searches(std::size_t corners) {
   return static_cast<int>(std::clamp(1e9 / (static_cast<double>(corners) * static_cast<double>(corners)), 8.0, 64.0));
 }
 
@@ -117,15 +117,15 @@ std::vector<std::array<std::uint32_t, 3>> triangulate(const std::vector<Vector3d
   if (corners.size() == 3 || !(normal.squaredNorm() > 0)) return fan(corners.size());
   const std::vector<Vector2d> flat = projected(corners, normal);
   if (is_convex(flat)) return fan(corners.size());
-  if (corners.size() > most_concave_corners)
+  if (corners.size() > max_concave_corners)
     throw std::runtime_error("a concave polygon has " + std::to_string(corners.size()) +
-                             " corners; divide those with more than " + std::to_string(most_concave_corners));
+                             " corners; divide those with more than " + std::to_string(max_concave_corners));
   std::vector<std::array<std::uint32_t, 3>> triangles;
   CornerRing ring(flat);
   int searches = 0;
   for (std::size_t at = 0; ring.size() > 3;) {
     std::optional<std::size_t> ear = ring.next_ear(at);
-    if (!ear && searches++ < most_searches(corners.size())) {
+    if (!ear && searches++ < max_searches(corners.size())) {
       ring.forget();
       ear = ring.next_ear(at);
     }

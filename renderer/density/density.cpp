@@ -15,7 +15,7 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
 constexpr double units = 1.7179869184e10;  // 2^34.
-constexpr double least_blurred_tau = 2;    // For less the spline is not narrow enough beside the Gaussian.
+constexpr double min_blurred_tau = 2;      // For less the spline is not narrow enough beside the Gaussian.
 constexpr double spline_variance = 1.0 / 3;
 constexpr double gaussian_reach = 4.5;  // Standard deviations; the Gaussian is 4e-5 of its peak there.
 constexpr double footprint_reach = 3;   // Standard deviations.
@@ -30,7 +30,7 @@ struct Tap {
 };
 
 bool is_blurred(const DensitySettings& settings) {
-  return settings.kind == DensityKind::gaussian && settings.tau >= least_blurred_tau;
+  return settings.kind == DensityKind::gaussian && settings.tau >= min_blurred_tau;
 }
 
 /// Reflects an index into [0, size), as mirrors at the outer edges of the first and last pixel would.

@@ -11,8 +11,8 @@ namespace tensorray {
 namespace {
 
 constexpr int cells_along_axis = 1 << 20;  // At most; keys have 21 bits for each axis.
-constexpr double least_agreement = 0.7;    // Between the normals of a photon's surface and of the point's.
-constexpr double most_height = 0.25;       // Of a photon above the point's plane, in radii.
+constexpr double min_agreement = 0.7;      // Between the normals of a photon's surface and of the point's.
+constexpr double max_height = 0.25;        // Of a photon above the point's plane, in radii.
 
 }  // namespace
 
@@ -68,8 +68,8 @@ double PhotonMap::density(const Photon& photon, const SurfaceHit& point) const {
   const Eigen::Vector3d way = photon.position.cast<double>() - point.position;
   const double height = way.dot(point.normal), squared = radius_ * radius_;
   const double distance = way.squaredNorm() - height * height;
-  if (!(distance < squared) || std::abs(height) > most_height * radius_) return 0;
-  if (photon.normal.cast<double>().dot(point.normal) < least_agreement) return 0;
+  if (!(distance < squared) || std::abs(height) > max_height * radius_) return 0;
+  if (photon.normal.cast<double>().dot(point.normal) < min_agreement) return 0;
   return 2 / (pi * squared) * (1 - distance / squared);
 }
 

@@ -83,10 +83,10 @@ Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Ve
 }
 
 bool is_surrounded(const Eigen::Vector3d& source, const std::vector<Eigen::Vector3d>& points) {
-  constexpr double least_cosine = 0.02;
+  constexpr double min_cosine = 0.02;
   const Eigen::Vector3d axis = axis_from(source, points);
   return std::any_of(points.begin(), points.end(), [&](const Eigen::Vector3d& point) {
-    return !((point - source).dot(axis) > least_cosine * (point - source).norm());
+    return !((point - source).dot(axis) > min_cosine * (point - source).norm());
   });
 }
 

@@ -40,24 +40,24 @@ std::vector<std::vector<TriangleCorner>> corners_by_vertex(const TriangleMesh& m
 }
 
 Eigen::Vector3f mean_normal(const TriangleCorner& corner, const std::vector<TriangleCorner>& around,
-                            double least_cosine) {
+                            double min_cosine) {
   Vector3d sum = Vector3d::Zero();
   for (const TriangleCorner& other : around)
-    if (corner.normal.dot(other.normal) >= least_cosine) sum += other.angle * other.normal;
+    if (corner.normal.dot(other.normal) >= min_cosine) sum += other.angle * other.normal;
   return sum.normalized().cast<float>();
 }
 
 }  // namespace
 
 MeshWithNormals with_smooth_normals(const TriangleMesh& mesh, double angle) {
-  const double least_cosine = std::cos(angle) - angle_rounding;
+  const double min_cosine = std::cos(angle) - angle_rounding;
   MeshWithNormals result;
   result.mesh.triangles.resize(mesh.triangles.size());
   const auto corners = corners_by_vertex(mesh);
   for (std::size_t vertex = 0; vertex < mesh.vertices.size(); ++vertex) {
     std::map<std::array<float, 3>, std::uint32_t> made;  // The normals of this vertex.
     for (const TriangleCorner& corner : corners[vertex]) {
-      const Eigen::Vector3f normal = mean_normal(corner, corners[vertex], least_cosine);
+      const Eigen::Vector3f normal = mean_normal(corner, corners[vertex], min_cosine);
       const auto [entry, is_new] =
           made.try_emplace({normal.x(), normal.y(), normal.z()}, static_cast<std::uint32_t>(result.normals.size()));
       result.mesh.triangles[corner.triangle][corner.number] = entry->second;

@@ -9,13 +9,13 @@ using Eigen::Vector3d;
 
 /// Least cosine between the shading normal and the direction to the viewer. Interpolated normals can place the viewer
 /// below a surface that is seen from above.
-constexpr double least_cosine = 0.01;
+constexpr double min_cosine = 0.01;
 
 /// The shading normal on the side that `direction` comes from, turned so that the viewer is above the surface. Without
 /// this, silhouettes of coarse meshes have black fringes. The geometric normal does not change.
 Vector3d facing_normal(const SurfaceHit& hit, const Vector3d& direction, double side) {
   const Vector3d normal = side * hit.shading_normal;
-  const double cosine = -normal.dot(direction), least = std::min(least_cosine, -side * hit.normal.dot(direction));
+  const double cosine = -normal.dot(direction), least = std::min(min_cosine, -side * hit.normal.dot(direction));
   return cosine < least ? Vector3d((normal + (cosine - least) * direction).normalized()) : normal;
 }
 

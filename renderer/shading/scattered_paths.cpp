@@ -14,7 +14,7 @@ constexpr std::uint32_t dimensions_per_vertex = 4;
 
 /// The part of its light's luminance that a path must carry to go on in any case. Measured on tubes in a studio's light
 /// (docs/dev/performance_notes.md): with 1/2 and 1/4 there is more noise for the time; with 1/16 it is the same.
-constexpr double least_carried = 0.1;
+constexpr double min_carried = 0.1;
 
 /// Chooses the direction in which the path leaves its surface, and changes its throughput.
 /// @param u           In [0, 1)².
@@ -32,7 +32,7 @@ std::optional<ScatteringSample> scatter(Wavefront& front, PathState& path, const
   refraction *= scattered->refraction;
   if (path.depth < front.settings.roulette_depth) return scattered;
   // Light that would hardly be seen is followed rarely: the brightness of what the path still carries decides.
-  const double survival = std::min(1.0, brightness(front.scene, path, path.throughput) / (least_carried * refraction));
+  const double survival = std::min(1.0, brightness(front.scene, path, path.throughput) / (min_carried * refraction));
   if (survival < 1) {
     if (!(path.sampler.next_1d() < survival)) return std::nullopt;
     path.throughput /= survival;

@@ -80,15 +80,15 @@ Vector3d step(const Fit& fit, double damping) {
 /// spectral colours is convex. So each colour has one spectrum, and the Jacobian is regular everywhere.
 Fit descend(const std::vector<BandColor>& bands, const Vector3d& rgb, const Vector3d& start) {
   constexpr int step_limit = 60;
-  constexpr double least_damping = 1e-14, first_damping = 1e-8, undamped = 1e-6, most_damping = 1e6, least_gain = 1e-3;
+  constexpr double min_damping = 1e-14, first_damping = 1e-8, undamped = 1e-6, max_damping = 1e6, min_gain = 1e-3;
   Fit best = evaluate(bands, rgb, start);
-  double damping = least_damping;
-  for (int i = 0; i < step_limit && best.error > tolerance * tolerance && damping < most_damping; ++i) {
+  double damping = min_damping;
+  for (int i = 0; i < step_limit && best.error > tolerance * tolerance && damping < max_damping; ++i) {
     const Fit next = evaluate(bands, rgb, step(best, damping));
     if (next.error < best.error) {
-      const bool stalled = damping < undamped && next.error > (1 - least_gain) * best.error;
+      const bool stalled = damping < undamped && next.error > (1 - min_gain) * best.error;
       best = next;
-      damping = std::max(damping / 100, least_damping);
+      damping = std::max(damping / 100, min_damping);
       if (stalled) break;
     } else {
       damping = std::max(damping * 30, first_damping);

@@ -18,7 +18,7 @@ namespace tensorray {
 namespace {
 
 constexpr double value_steps = 128;  // Steps in the range of all values: a smaller change needs no ring of its own.
-constexpr int most_pieces = 64;      // Between two points.
+constexpr int max_pieces = 64;       // Between two points.
 constexpr std::size_t chunk = 1024;  // Number of tubes whose meshes are made before they are joined.
 
 Eigen::Vector3d axis(const TubePoint& p) { return p.x.cross(p.y).normalized(); }
@@ -29,7 +29,7 @@ Eigen::Vector3d along_rim(const TubePoint& p, double angle) { return std::cos(an
 Eigen::Vector3d rim_normal(const TubePoint& p, double angle) { return along_rim(p, angle).cross(axis(p)).normalized(); }
 
 /// The greater semi-axis a. By the theorem of Apollonius, |x|² + |y|² = a² + b² and |x × y| = a b.
-double greatest_radius(const TubePoint& p) {
+double max_radius(const TubePoint& p) {
   const double sum = p.x.squaredNorm() + p.y.squaredNorm(), product = p.x.cross(p.y).norm();
   return (std::sqrt(sum + 2 * product) + std::sqrt(std::max(0.0, sum - 2 * product))) / 2;
 }
@@ -37,8 +37,8 @@ double greatest_radius(const TubePoint& p) {
 /// Number of segments of a polygon inscribed in a circle that is nowhere more than `tolerance` inside the circle.
 int segments_for(double radius, double tolerance, const TubeSettings& settings) {
   const double half = std::acos(std::clamp(1 - tolerance / radius, -1.0, 1.0));
-  const double wanted = half > 0 ? std::ceil(pi / half) : settings.most_segments;
-  return static_cast<int>(std::clamp(wanted, double(settings.least_segments), double(settings.most_segments)));
+  const double wanted = half > 0 ? std::ceil(pi / half) : settings.max_segments;
+  return static_cast<int>(std::clamp(wanted, double(settings.min_segments), double(settings.max_segments)));
 }
 
 /// A point between two points of a tube. The centre is on the cubic that has the tube's direction at both points, with
@@ -61,7 +61,7 @@ TubePoint between(const TubePoint& a, const TubePoint& b, double t) {
 /// Distance between the straight surface that joins two rings and the tube.
 double deviation(const TubePoint& a, const TubePoint& b) {
   const double turn = (axis(b) - axis(a)).norm();
-  return ((b.center - a.center).norm() + turn * std::max(greatest_radius(a), greatest_radius(b))) * turn / 8;
+  return ((b.center - a.center).norm() + turn * std::max(max_radius(a), max_radius(b))) * turn / 8;
 }
 
 /// Leaves out rings that interpolation gives to half the tolerance, and adds rings where the curvature needs them.
@@ -94,7 +94,7 @@ Tube adapted(const Tube& tube, double tolerance, double value_tolerance, double 
     if (!result.empty()) {
       const TubePoint last = result.back();
       const double wanted = std::ceil(std::sqrt(deviation(last, tube[i]) / (tolerance / 2)));
-      const int pieces = static_cast<int>(std::clamp(wanted, 1.0, double(most_pieces)));
+      const int pieces = static_cast<int>(std::clamp(wanted, 1.0, double(max_pieces)));
       for (int piece = 1; piece < pieces; ++piece) result.push_back(between(last, tube[i], double(piece) / pieces));
     }
     result.push_back(tube[i]);
@@ -235,7 +235,7 @@ struct TubeJob {
 /// A round wire along the ellipse of `point`.
 void add_hoop(const TubeJob& job, const TubePoint& point, TubeMesh& mesh) {
   const TubeSettings& s = job.settings;
-  const int pieces = std::max(12, segments_for(greatest_radius(point), s.tolerance, s));
+  const int pieces = std::max(12, segments_for(max_radius(point), s.tolerance, s));
   Tube hoop;
   for (int j = 0; j < pieces; ++j) {
     const double angle = 2 * pi * j / pieces;
@@ -264,7 +264,7 @@ void add_disc(const TubeJob& job, const TubePoint& point, TubeMesh& mesh) {
   Tube disc{point, point};
   disc[0].center -= job.settings.thickness / 2 * axis(point);
   disc[1].center += job.settings.thickness / 2 * axis(point);
-  add_solid(disc, segments_for(greatest_radius(point), job.settings.tolerance, job.settings), TubeCaps::flat, mesh);
+  add_solid(disc, segments_for(max_radius(point), job.settings.tolerance, job.settings), TubeCaps::flat, mesh);
 }
 
 TubeMesh make_tube(const TubeJob& job, const Tube& tube) {
@@ -279,7 +279,7 @@ TubeMesh make_tube(const TubeJob& job, const Tube& tube) {
       for (int j = 0; j < settings.lines; ++j) add_line(job, rings, 2 * pi * j / settings.lines, mesh);
     } else {
       double radius = 0;
-      for (const TubePoint& ring : rings) radius = std::max(radius, greatest_radius(ring));
+      for (const TubePoint& ring : rings) radius = std::max(radius, max_radius(ring));
       add_solid(rings, segments_for(radius, settings.tolerance, settings), settings.caps, mesh);
     }
   }
@@ -288,7 +288,7 @@ TubeMesh make_tube(const TubeJob& job, const Tube& tube) {
 }
 
 [[noreturn]] void refuse_size(const TubeSettings& settings) {
-  throw std::runtime_error("the tubes need more than " + std::to_string(settings.most_triangles) +
+  throw std::runtime_error("the tubes need more than " + std::to_string(settings.max_triangles) +
                            " triangles: draw fewer of them, lines instead, or a picture of fewer pixels");
 }
 
@@ -341,8 +341,8 @@ void require_few_ellipses(const std::vector<Tube>& tubes, const TubeSettings& se
   for (const Tube& tube : tubes)
     for (std::size_t i = 1; i < tube.size(); ++i)
       ellipses += (tube[i].center - tube[i - 1].center).norm() / settings.spacing;
-  const double triangles = ellipses * settings.least_segments * (settings.style == TubeStyle::wire ? 24 : 2);
-  if (triangles > static_cast<double>(settings.most_triangles)) refuse_size(settings);
+  const double triangles = ellipses * settings.min_segments * (settings.style == TubeStyle::wire ? 24 : 2);
+  if (triangles > static_cast<double>(settings.max_triangles)) refuse_size(settings);
 }
 
 TubeJob make_job(const std::vector<Tube>& tubes, TubeSettings settings) {
@@ -350,10 +350,9 @@ TubeJob make_job(const std::vector<Tube>& tubes, TubeSettings settings) {
   for (const double length : lengths)
     if (!(length >= 0) || !std::isfinite(length))
       throw std::invalid_argument("lengths of the tubes' style must be positive, or 0 (automatic)");
-  if (settings.least_segments < 3 || settings.most_segments < settings.least_segments)
+  if (settings.min_segments < 3 || settings.max_segments < settings.min_segments)
     throw std::invalid_argument("tubes need 3 segments around or more, and no fewer at most than at least");
-  if (settings.most_triangles > std::uint64_t{1} << 31)
-    throw std::invalid_argument("tubes have at most 2^31 triangles");
+  if (settings.max_triangles > std::uint64_t{1} << 31) throw std::invalid_argument("tubes have at most 2^31 triangles");
   if (settings.lines < 0) throw std::invalid_argument("the number of lines of wire tubes must not be negative");
   for (const Tube& tube : tubes)
     for (const TubePoint& point : tube)
@@ -391,7 +390,7 @@ TubeMesh make_tube_mesh(std::vector<Tube> tubes, const TubeSettings& settings) {
     std::vector<TubeMesh> parts(std::min(chunk, tubes.size() - first));
     tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
       parts[i] = make_tube(job, std::exchange(tubes[first + i], {}));
-      if ((triangles += parts[i].mesh.triangles.size()) > settings.most_triangles) refuse_size(settings);
+      if ((triangles += parts[i].mesh.triangles.size()) > settings.max_triangles) refuse_size(settings);
     });
     chunks.push_back(joined(parts));
   }

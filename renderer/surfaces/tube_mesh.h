@@ -45,8 +45,8 @@ struct TubeSettings {
   /// the number of rings; with the size of the ellipses, the number of segments around them. The best choice is a
   /// fraction of a pixel's size. 0: 1/50.
   double tolerance = 0;
-  int least_segments = 6;  ///< Fewest segments around an ellipse; >= 3.
-  int most_segments = 64;  ///< Most segments around an ellipse; >= least_segments.
+  int min_segments = 6;   ///< Fewest segments around an ellipse; >= 3.
+  int max_segments = 64;  ///< Most segments around an ellipse; >= min_segments.
 
   double spacing = 0;      ///< Distance along the tube between the ellipses of the wire and disc styles. 0: 2.
   double wire_radius = 0;  ///< Radius of the wires. 0: 1/20.
@@ -54,7 +54,7 @@ struct TubeSettings {
   double thickness = 0;    ///< Thickness of discs. 0: 1/10.
 
   /// Limits the memory: a triangle of a solid tube takes about 34 bytes here, and about 70 more in a ray tracer.
-  std::uint64_t most_triangles = 250'000'000;  ///< At most 2^31.
+  std::uint64_t max_triangles = 250'000'000;  ///< At most 2^31.
 };
 
 /// Triangles, counter-clockwise from outside, with what shading needs at each vertex. The triangles of a smooth surface

@@ -48,7 +48,7 @@ void describe(FieldDescription& field, Visitor& visit) {
                 "scalar grids of the file that are the components, whatever their names");
   visit.exclude("components", {"generate"});
   visit("smooth", field.smooth, "standard deviation of a Gaussian that smooths the field first, voxels; 0 is none",
-        between(0, greatest_smoothing));
+        between(0, max_smoothing));
   visit("eigenvalues", field.eigenvalues,
         "raw: as they are; absolute: |T|; positive: (T^2)^(1/2); auto: absolute if the field is symmetric, else raw",
         knob());

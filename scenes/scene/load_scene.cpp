@@ -23,9 +23,9 @@ namespace {
 
 constexpr double default_margin = 1.25;    // Size of the plate, in extents of the beam.
 constexpr double default_distance = 0.25;  // Distance of the plate behind the volume, in depths of the volume.
-constexpr double greatest_size = 1e5;  // Largest size of the scene, in sizes of the volume: Embree is single precision.
+constexpr double max_size = 1e5;  // Largest size of the scene, in sizes of the volume: Embree is single precision.
 constexpr double narrowest_white = 100;  // nm: light of a narrower range has no white.
-constexpr double most_stretched = 1.05;  // Pixels' longer side over the shorter one.
+constexpr double max_stretch = 1.05;     // Pixels' longer side over the shorter one.
 constexpr int default_resolution = 512;  // Pixels along the plate's longer side.
 
 BlockSource open_field(const SceneDescription& scene) {
@@ -158,7 +158,7 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
 void note_pixels(const ReceiverDescription& receiver, const Plate& plate, std::vector<std::string>& notes) {
   if (!receiver.resolution) return;
   const Eigen::Vector2d pixel = plate.size.cwiseQuotient(plate.resolution.cast<double>());
-  if (pixel.maxCoeff() < most_stretched * pixel.minCoeff()) return;
+  if (pixel.maxCoeff() < max_stretch * pixel.minCoeff()) return;
   const Eigen::Vector2i square =
       (plate.resolution.maxCoeff() * plate.size / plate.size.maxCoeff()).array().round().max(1).cast<int>();
   notes.push_back(
@@ -172,18 +172,18 @@ void note_pixels(const ReceiverDescription& receiver, const Plate& plate, std::v
   throw SceneError(
       fmt::format("{}: `{}` is too large or too far away: more than {:g} times the volume's size; make it smaller or "
                   "move it nearer",
-                  description.path.string(), pointer, greatest_size));
+                  description.path.string(), pointer, max_size));
 }
 
-double greatest_distance(const TensorField& field) {
+double max_distance(const TensorField& field) {
   Eigen::AlignedBox3d volume;
   for (const Eigen::Vector3d& corner : field.corners()) volume.extend(corner);
-  return greatest_size * volume.diagonal().norm();
+  return max_size * volume.diagonal().norm();
 }
 
 void require_near(const Beam& beam, const SceneDescription& description, const TensorField& field) {
   for (const Eigen::Vector2d& corner : beam.aperture)
-    if (!(corner.norm() < greatest_distance(field))) fail_size(description, "/light/aperture");
+    if (!(corner.norm() < max_distance(field))) fail_size(description, "/light/aperture");
 }
 
 /// Loads the bounds of the field and its cut.
@@ -330,7 +330,7 @@ DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, 
 void require_near(const Plate& plate, const char* pointer, const SceneDescription& description,
                   const TensorField& field) {
   const Eigen::Vector3d middle = field.to_world() * field.index_bounds().center();
-  if (!(plate.size.maxCoeff() < greatest_distance(field) && (plate.center - middle).norm() < greatest_distance(field)))
+  if (!(plate.size.maxCoeff() < max_distance(field) && (plate.center - middle).norm() < max_distance(field)))
     fail_size(description, pointer);
 }
 

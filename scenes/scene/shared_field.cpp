@@ -24,7 +24,7 @@ struct FileEnding {
   std::array<double, 16> to_world;
   std::array<int, 6> voxels;
   Interpolant interpolant;
-  double greatest_norm;
+  double max_norm;
   std::size_t bricks, stride;
   int components;
   EigenvalueReport eigenvalues;
@@ -42,7 +42,7 @@ FileEnding ending_of(const LoadedField& loaded, std::size_t notes) {
   std::copy_n(voxels.min().data(), 3, ending.voxels.begin());
   std::copy_n(voxels.max().data(), 3, ending.voxels.begin() + 3);
   ending.interpolant = field.interpolant();
-  ending.greatest_norm = field.greatest_norm();
+  ending.max_norm = field.max_norm();
   ending.bricks = field.memory().count;
   ending.stride = field.memory().stride;
   ending.components = field.memory().components;
@@ -95,7 +95,7 @@ std::optional<LoadedField> field_of_file(Descriptor file) {
   std::copy_n(ending.voxels.begin(), 3, parts.voxels.min().data());
   std::copy_n(ending.voxels.begin() + 3, 3, parts.voxels.max().data());
   parts.interpolant = ending.interpolant;
-  parts.greatest_norm = ending.greatest_norm;
+  parts.max_norm = ending.max_norm;
   std::string notes(ending.notes, '\0');
   parts.strongest.resize(ending.bricks);
   parts.bricks.resize(ending.bricks);

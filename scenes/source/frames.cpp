@@ -10,8 +10,8 @@
 namespace tensorray {
 namespace {
 
-constexpr long greatest_frame = 1000000000;
-constexpr long most_frames = 1000000;
+constexpr long max_frame = 1000000000;
+constexpr long max_frames = 1000000;
 
 /// Reads a number from the front of `text` and removes it; -1 if there is none.
 long take_number(std::string& text) {
@@ -20,7 +20,7 @@ long take_number(std::string& text) {
   if (digits == 0 || digits > 10) return -1;
   const long number = std::stol(text.substr(0, digits));
   text.erase(0, digits);
-  return number <= greatest_frame ? number : -1;
+  return number <= max_frame ? number : -1;
 }
 
 bool take(std::string& text, char wanted) {
@@ -114,8 +114,7 @@ std::vector<int> parse_frames(const std::string& text) {
       throw std::invalid_argument("--frames " + printable(text) +
                                   ": give frames such as 7, 1-240, 1-240x2, or a list of these, 1,3,7-9");
     named += (last - first) / step + 1;
-    if (named > most_frames)
-      throw std::invalid_argument("--frames " + printable(text) + ": more than a million frames");
+    if (named > max_frames) throw std::invalid_argument("--frames " + printable(text) + ": more than a million frames");
     for (long frame = first; frame <= last; frame += step)
       if (seen.insert(static_cast<int>(frame)).second) frames.push_back(static_cast<int>(frame));
   } while (take(rest, ','));

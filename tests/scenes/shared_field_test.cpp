@@ -31,7 +31,7 @@ LoadedField loaded_field(bool symmetric, const Interpolant& interpolant) {
 
 bool are_same(const TensorField& a, const TensorField& b) {
   if (a.bricks() != b.bricks() || a.memory().stride != b.memory().stride || a.interpolant() != b.interpolant() ||
-      a.is_symmetric() != b.is_symmetric() || a.greatest_norm() != b.greatest_norm() ||
+      a.is_symmetric() != b.is_symmetric() || a.max_norm() != b.max_norm() ||
       a.to_world().matrix() != b.to_world().matrix() || a.to_index().matrix() != b.to_index().matrix() ||
       !a.index_bounds().isApprox(b.index_bounds(), 0) || !a.voxels().isApprox(b.voxels(), 0))
     return false;

@@ -220,7 +220,7 @@ inline RayBatch traced_by_reference(const Scene& scene, RayBatch rays) {
 inline RayBatch turned_a_little(const Scene& scene) {
   RayBatch rays = scene.rays;
   const double step = scene.settings.step > 0 ? scene.settings.step : 1.0 / 64;
-  const double strength = step * mean_edge * std::abs(scene.settings.scale) * scene.field.greatest_norm();
+  const double strength = step * mean_edge * std::abs(scene.settings.scale) * scene.field.max_norm();
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const double turn = 3e-7 * std::max(1.0, strength * std::abs(rays.flexibility[i]));
     rays.flexibility[i] *= 1 + 3e-7;

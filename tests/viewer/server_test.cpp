@@ -36,7 +36,7 @@ class ServerTest : public test::ViewTest {
     settings.token = token_;
     settings.page = in_folder("");
     settings.hosts = {"workstation"};
-    settings.most_waiting_bytes = waiting_bytes;
+    settings.max_waiting_bytes = waiting_bytes;
     pages_.emplace(viewed(), progress_);
     server_.emplace(settings, *pages_);
     const std::string url = server_->url();
@@ -203,7 +203,7 @@ TEST_F(ServerTest, SurvivesHostileBytes) {
   Socket socket = open_socket();
   socket.binary(true);
   socket.write(asio::buffer(std::string("\xff\xfe\xfd")));
-  socket.write(asio::buffer(std::string(Server::most_message_bytes + 1, ' ')));
+  socket.write(asio::buffer(std::string(Server::max_message_bytes + 1, ' ')));
   EXPECT_THROW(
       {
         for (;;) read_json(socket);
@@ -221,10 +221,10 @@ TEST_F(ServerTest, BoundsConnectionsAndPages) {
   std::vector<Socket> sockets;
   EXPECT_THROW(
       {
-        for (std::size_t i = 0; i < Server::most_pages + 2; ++i) sockets.push_back(open_socket());
+        for (std::size_t i = 0; i < Server::max_pages + 2; ++i) sockets.push_back(open_socket());
       },
       boost::system::system_error);
-  EXPECT_GE(sockets.size(), Server::most_pages - 1);
+  EXPECT_GE(sockets.size(), Server::max_pages - 1);
 }
 
 /// A page that asks and never reads.

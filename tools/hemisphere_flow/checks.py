@@ -61,7 +61,7 @@ def downwash(flow, x):
     return velocity.GetComponent(least, 2), points[least][2]
 
 
-def least_axial_speed(flow):
+def min_axial_speed(flow):
     """The least velocity along x above the body in the plane of symmetry, and where; negative where the flow is separated."""
     points = [(0.1 * i, 0, 1.02 + 0.02 * k) for i in range(60) for k in range(40)]
     data, _ = sample(flow, points)
@@ -79,7 +79,7 @@ def main(path):
     against = (-math.cos(INCIDENCE), 0, -math.sin(INCIDENCE))
     print(f"bow shock {stand_off(flow, (-1, 0, 0)):.2f} radii before the nose (expected 1.4), ", end="")
     print(f"{stand_off(flow, against):.2f} before the stagnation point")
-    speed, (x, _, z) = least_axial_speed(flow)
+    speed, (x, _, z) = min_axial_speed(flow)
     print(f"lee side, plane of symmetry: least u {speed:+.3f} at x = {x:.1f}, z = {z:.2f} (negative: separated)")
     for x in (4, 5, 6):
         y, z, vorticity, swirl = vortex(flow, x)

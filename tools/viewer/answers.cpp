@@ -17,11 +17,11 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int cells = 40;                      // Along a side of the lattice of LandedRays.
-constexpr int shown_rays = 7;                  // Along a side of the beam, for each colour.
-constexpr std::size_t most_points = 40;        // Of a drawn ray.
-constexpr std::size_t most_ways = 4;           // To one pixel, for each colour.
-constexpr std::size_t most_triangles = 60000;  // Of all meshes: a page is no place for more.
+constexpr int cells = 40;                     // Along a side of the lattice of LandedRays.
+constexpr int shown_rays = 7;                 // Along a side of the beam, for each colour.
+constexpr std::size_t max_points = 40;        // Of a drawn ray.
+constexpr std::size_t max_ways = 4;           // To one pixel, for each colour.
+constexpr std::size_t max_triangles = 60000;  // Of all meshes: a page is no place for more.
 
 Json to_json(const Vector3d& p) { return {p.x(), p.y(), p.z()}; }
 
@@ -48,7 +48,7 @@ std::string color_of(const Scene& scene, std::size_t channel) {
 /// Every few points of a ray that has some, and its last one.
 Json polyline(const TensorField& field, const RayRecord& ray) {
   Json points = Json::array();
-  const std::size_t step = (ray.size() + most_points - 1) / most_points, last = ray.size() - 1;
+  const std::size_t step = (ray.size() + max_points - 1) / max_points, last = ray.size() - 1;
   for (std::size_t i = 0; i < last; i += step) points.push_back(to_json(path_point(field, ray, i).position));
   points.push_back(to_json(path_point(field, ray, last).position));
   return points;
@@ -90,7 +90,7 @@ Json describe_mesh(const TriangleMesh& mesh, const std::string& name) {
 
 Json describe_meshes(const Scene& scene) {
   Json meshes = Json::array();
-  std::size_t left = most_triangles;
+  std::size_t left = max_triangles;
   const auto add = [&](const TriangleMesh& mesh, const std::string& name) {
     if (mesh.triangles.size() > left) return;
     left -= mesh.triangles.size();
@@ -222,7 +222,7 @@ Json LandedRays::to(const Scene& scene, const Vector2d& place) const {
     std::vector<Vector3d> starts;
     const auto try_triangle = [&](int i, int j, int k) {
       const auto part = barycentric({landings[i], landings[j], landings[k]}, place);
-      if (part && starts.size() < most_ways)
+      if (part && starts.size() < max_ways)
         starts.push_back((*part)[0] * starts_[i] + (*part)[1] * starts_[j] + (*part)[2] * starts_[k]);
     };
     for (int y = 0; y < cells; ++y)

@@ -22,7 +22,7 @@
 namespace tensorray {
 namespace {
 
-constexpr std::size_t most_requests = 32;  // Of one page, waiting.
+constexpr std::size_t max_requests = 32;  // Of one page, waiting.
 constexpr int coarsest = 16;
 constexpr double soon = 0.1, very_soon = 0.03;  // Seconds that a first picture may take, and that allow a finer one.
 
@@ -170,7 +170,7 @@ void Pages::receive(Id id, const std::string& text) {
       page.scene = Request{type, std::move(message), false};
       if (rendering_.page == *found && !rendering_.is_first) progress_.cancelled = true;
     } else {
-      if (page.requests.size() >= most_requests) throw std::invalid_argument("too many requests are waiting");
+      if (page.requests.size() >= max_requests) throw std::invalid_argument("too many requests are waiting");
       page.requests.push_back({type, std::move(message), page.scene.has_value()});
     }
   } catch (const std::exception& error) {

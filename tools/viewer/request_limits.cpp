@@ -8,11 +8,11 @@
 namespace tensorray {
 namespace {
 
-constexpr double most_pixels = 2048.0 * 2048;
-constexpr double most_positions = 1 << 22;
-constexpr double most_generated_voxels = 256.0 * 256 * 256;
-constexpr int most_bands = 512;
-constexpr double most_steps = 1 << 22;  // Of one ray, which cannot be interrupted.
+constexpr double max_pixels = 2048.0 * 2048;
+constexpr double max_positions = 1 << 22;
+constexpr double max_generated_voxels = 256.0 * 256 * 256;
+constexpr int max_bands = 512;
+constexpr double max_ray_steps = 1 << 22;  // Of one ray, which cannot be interrupted.
 
 std::filesystem::path resolved(const std::filesystem::path& file) {
   std::error_code none;
@@ -44,13 +44,13 @@ void AllowedFiles::require(const SceneDescription& scene) const {
 
 void require_moderate(const SceneDescription& scene) {
   if (scene.receiver.resolution)
-    require_at_most(most_pixels, scene.receiver.resolution->cast<double>().prod(), "/receiver/resolution", scene);
-  require_at_most(most_pixels, scene.camera.resolution.cast<double>().prod(), "/camera/resolution", scene);
-  require_at_most(most_positions, static_cast<double>(scene.light.photons), "/light/photons", scene);
-  require_at_most(most_bands, scene.light.wavelength_count, "/light/wavelengths/count", scene);
-  require_at_most(most_steps, scene.bending.settings.max_steps, "/bending/max_steps", scene);
+    require_at_most(max_pixels, scene.receiver.resolution->cast<double>().prod(), "/receiver/resolution", scene);
+  require_at_most(max_pixels, scene.camera.resolution.cast<double>().prod(), "/camera/resolution", scene);
+  require_at_most(max_positions, static_cast<double>(scene.light.photons), "/light/photons", scene);
+  require_at_most(max_bands, scene.light.wavelength_count, "/light/wavelengths/count", scene);
+  require_at_most(max_ray_steps, scene.bending.settings.max_steps, "/bending/max_steps", scene);
   if (scene.field.generate)
-    require_at_most(most_generated_voxels, scene.field.generate->grid.resolution.cast<double>().prod(),
+    require_at_most(max_generated_voxels, scene.field.generate->grid.resolution.cast<double>().prod(),
                     "/field/generate/resolution", scene);
 }
 

@@ -5,7 +5,7 @@
 namespace tensorray {
 namespace {
 
-constexpr std::uint64_t least_positions = 1024;
+constexpr std::uint64_t min_positions = 1024;
 constexpr int few_samples = 4;
 
 Json pixels(const Eigen::Vector2i& resolution, int coarseness) {
@@ -38,7 +38,7 @@ Json at_stage(const Json& scene, const SceneDescription& description, const Eige
     section(result, "receiver")["resolution"] = pixels(resolution, stage.coarseness);
     section(result, "camera")["resolution"] = pixels(description.camera.resolution, stage.coarseness);
     const auto fewer = static_cast<std::uint64_t>(stage.coarseness) * static_cast<std::uint64_t>(stage.coarseness);
-    section(result, "light")["photons"] = std::max(description.light.photons / fewer, least_positions);
+    section(result, "light")["photons"] = std::max(description.light.photons / fewer, min_positions);
   }
   if (stage.samples > 0) {
     Json& integrator = section(result, "integrator");

@@ -159,9 +159,9 @@ Eigen::AlignedBox3d Geometry::absorbers_within(const Eigen::AlignedBox3d& region
 std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double max_distance) const {
   const Group& group = surface == Surface::bounds ? state_->bounds : state_->cut;
-  constexpr int most_crossings = 10000;  // Of one line with one mesh; rounding must not make this loop endless.
+  constexpr int max_crossings = 10000;  // Of one line with one mesh; rounding must not make this loop endless.
   double from = -state_->margin;
-  for (int i = 0; i < most_crossings; ++i) {
+  for (int i = 0; i < max_crossings; ++i) {
     auto hit = state_->nearest(group, origin, direction, from, max_distance + state_->margin);
     if (!hit || hit->distance > max_distance) return std::nullopt;
     if ((hit->normal.dot(direction) < 0) == inwards) {

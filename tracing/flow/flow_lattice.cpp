@@ -6,7 +6,7 @@
 namespace tensorray {
 namespace {
 
-constexpr int most_columns = 1 << 12;  // Number of first quads along a side.
+constexpr int max_columns = 1 << 12;  // Number of first quads along a side.
 
 bool is_parallelogram(const std::vector<Eigen::Vector2d>& polygon) {
   if (polygon.size() != 4) return false;
@@ -46,7 +46,7 @@ std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, doubl
     const auto count = [&](int a, int b, int c, int d) {
       const double length =
           std::max((patch.corners[b] - patch.corners[a]).norm(), (patch.corners[d] - patch.corners[c]).norm());
-      return static_cast<int>(std::clamp(std::ceil(length / quad_size), 1.0, double{most_columns}));
+      return static_cast<int>(std::clamp(std::ceil(length / quad_size), 1.0, double{max_columns}));
     };
     patch.columns = count(0, 1, 3, 2);
     patch.rows = count(1, 2, 0, 3);

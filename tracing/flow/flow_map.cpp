@@ -21,7 +21,7 @@ constexpr double margin = 1.0 / 8;  // Extension of the plate on each side, in s
 // The first quads are of the lesser of these two sizes, for the usual tolerance.
 constexpr double first_pixels = 8;       // In pixels of straight light.
 constexpr double first_voxels = 1;       // In voxels, so that no part of the field is missed; ...
-constexpr double most_for_voxels = 64;   // ... but voxels ask for no more quads than this along a side.
+constexpr double max_for_voxels = 64;    // ... but voxels ask for no more quads than this along a side.
 constexpr double usual_tolerance = 0.5;  // Pixels.
 
 constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
@@ -30,7 +30,7 @@ constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than 
 constexpr float still_pixels = 1;  // Light that moves by no more, from the first wavelength sample to the last, is in
                                    // one place.
 constexpr double swept_share = 0.99;  // The part of the vertices whose light moves slowly enough from band to band.
-constexpr int most_levels = 14;
+constexpr int max_levels = 14;
 constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
 
 /// Vertices in the middles of a quad's sides, counter-clockwise from the lower one, and in its own.
@@ -50,9 +50,9 @@ double first_size(const TensorField& field, const Beam& beam, double pixel, cons
   const Eigen::Vector2d extent = box_of(beam.aperture).sizes();
   const double voxel =
       start_ratio(beam, field.world_box().center()) * field.to_world().linear().colwise().norm().minCoeff();
-  const double for_voxels = std::max(first_voxels * voxel, extent.maxCoeff() / most_for_voxels);
+  const double for_voxels = std::max(first_voxels * voxel, extent.maxCoeff() / max_for_voxels);
   const double usual = std::min(first_pixels * pixel, for_voxels);
-  const double least = std::sqrt(16 * extent.prod() / static_cast<double>(settings.most_starts));
+  const double least = std::sqrt(16 * extent.prod() / static_cast<double>(settings.max_starts));
   return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
 }
 
@@ -77,8 +77,8 @@ class FlowMapBuilder {
     lattice().is_graded = settings.silhouette;
     first_size_ = static_cast<float>(size / pixel);
     const double finest = std::min(settings.finest, settings.tolerance) * pixel;
-    while (lattice().levels < most_levels && std::ldexp(size, -lattice().levels) > finest) ++lattice().levels;
-    lattice().still_levels = is_light() && lattice().levels < most_levels ? 1 : 0;
+    while (lattice().levels < max_levels && std::ldexp(size, -lattice().levels) > finest) ++lattice().levels;
+    lattice().still_levels = is_light() && lattice().levels < max_levels ? 1 : 0;
     lattice().levels += lattice().still_levels;
   }
 
@@ -209,7 +209,7 @@ class FlowMapBuilder {
     for (std::size_t i = 0; i < quads_.size(); ++i)
       if (needs[i]) chosen.push_back(i);
     // A division adds up to five vertices, and about three as neighbours share them.
-    const std::size_t room = (settings_.most_starts - std::min(settings_.most_starts, map().starts.size())) / 3;
+    const std::size_t room = (settings_.max_starts - std::min(settings_.max_starts, map().starts.size())) / 3;
     if (chosen.size() > room) {
       is_complete_ = false;
       std::stable_sort(chosen.begin(), chosen.end(),
@@ -356,7 +356,7 @@ FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const
   }
   if (settings.flexibilities.empty() || (settings.range && settings.flexibilities.size() != 2))
     throw std::invalid_argument("a flow map needs flexibilities, and a range has two");
-  if (!(settings.tolerance > 0) || !(settings.finest > 0) || settings.most_starts < 1)
+  if (!(settings.tolerance > 0) || !(settings.finest > 0) || settings.max_starts < 1)
     throw std::invalid_argument("a flow map needs a tolerance and a number of positions greater than 0");
   return FlowMapBuilder(field, geometry, beam, bending, settings, progress).build();
 }

@@ -45,7 +45,7 @@ struct FlowSettings {
 
   bool side_light = true;  ///< Whether light that leaves the volume by a side face counts (SideFaces; parallel light).
 
-  std::size_t most_starts = std::size_t{1} << 20;  ///< Refinement stops at so many vertices; > 0.
+  std::size_t max_starts = std::size_t{1} << 20;  ///< Refinement stops at so many vertices; > 0.
 
   Job* job = nullptr;  ///< Whose ranks trace the map together, each a part of its rays; null: alone.
 

@@ -82,7 +82,7 @@ void FlowVertices::trace_new() {
     copy_landings(first + task * task_size, end_of(task), archive);
   };
   tasks.first = first / task_size;
-  tasks.total = settings_.most_starts / task_size + 1;
+  tasks.total = settings_.max_starts / task_size + 1;
   make_units(tasks, settings_.job, "tracing rays", progress_);
   traced_ = count;
 }

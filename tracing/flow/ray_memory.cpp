@@ -11,7 +11,7 @@
 namespace tensorray {
 namespace {
 
-constexpr std::size_t most_exits = std::size_t{1} << 20;  // Some 150 MiB.
+constexpr std::size_t max_exits = std::size_t{1} << 20;  // Some 150 MiB.
 
 }  // namespace
 
@@ -80,7 +80,7 @@ void RayMemory::trace(const TensorField& field, const Geometry& volume, const Ge
   std::vector<Key> keys;
   for (std::size_t i = 0; i < unknown.size(); ++i) keys.push_back(key_of(unknown, i));
   tensorray::trace(field, volume, settings, unknown);
-  const bool has_room = exits_.size() < most_exits;
+  const bool has_room = exits_.size() < max_exits;
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const Exit exit{unknown.position[i], unknown.direction[i], unknown.length[i], unknown.end[i]};
     if (has_room) exits_.emplace(keys[i], exit);

@@ -19,7 +19,7 @@ namespace {
 constexpr double even_part = 0.1;     // If the densities of a quad's halves differ by less than this part of their sum,
                                       // they become one; ...
 constexpr double uneven_part = 0.15;  // ... from this part on they stay as they are.
-constexpr std::size_t most_memory = 1u << 28;  // Bytes of the deposits of all threads; but each has a row, at least.
+constexpr std::size_t max_memory = 1u << 28;  // Bytes of the deposits of all threads; but each has a row, at least.
 constexpr std::size_t planes = DepositPlanes::count;
 
 /// What is drawn together on the planes of a deposit: the colours, or the irradiance of some channels.
@@ -232,7 +232,7 @@ struct Strip {
 std::vector<Strip> strips_of(const Eigen::Vector2i& plate, Ranks* ranks) {
   const auto threads = static_cast<std::size_t>(broadcast(ranks, tbb::this_task_arena::max_concurrency()));
   const std::size_t row = 8 * planes * (static_cast<std::size_t>(plate.x()) + 3);
-  const int rows = static_cast<int>(std::clamp<std::size_t>(most_memory / (threads * row), 1, plate.y()));
+  const int rows = static_cast<int>(std::clamp<std::size_t>(max_memory / (threads * row), 1, plate.y()));
   std::vector<Strip> strips;
   for (int first = 0; first < plate.y(); first += rows) strips.push_back({first, std::min(first + rows, plate.y())});
   return strips;
@@ -255,7 +255,7 @@ void add_to_films(const Pass& pass, const std::vector<AreaDeposit>& joined, cons
 
 /// The greatest sum of parts that a plane gets: plane_weights are divided by it, so that no sum of integers is too
 /// great.
-double greatest_sum(const std::vector<AreaDeposit::PlaneWeights>& plane_weights) {
+double max_sum(const std::vector<AreaDeposit::PlaneWeights>& plane_weights) {
   AreaDeposit::PlaneWeights sums{};
   for (const AreaDeposit::PlaneWeights& each : plane_weights)
     for (std::size_t k = 0; k < planes; ++k) sums[k] += std::abs(each[k]);
@@ -267,7 +267,7 @@ std::vector<Pass> passes_of(const std::vector<CausticBand>& bands, double gain, 
   const auto channels = caustic.power.size();
   std::vector<Pass> passes;
   const auto add = [&](Pass pass) {
-    const double greatest = greatest_sum(pass.plane_weights);
+    const double greatest = max_sum(pass.plane_weights);
     if (greatest == 0 && pass.first_channel == pass.end_channel) return;
     for (AreaDeposit::PlaneWeights& plane_weights : pass.plane_weights)
       for (double& share : plane_weights) share /= greatest > 0 ? greatest : 1;

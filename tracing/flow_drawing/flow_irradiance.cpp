@@ -101,7 +101,7 @@ FlowSettings flow_settings(const LandingLight& light, const Plate& plate, const 
   settings.flexibilities = settings.range ? std::vector<double>{*least, *greatest} : std::vector<double>{*least};
   settings.plate = plate;
   settings.tolerance = landing_tolerance;
-  settings.most_starts = wanted.rays;
+  settings.max_starts = wanted.rays;
   settings.job = wanted.job;
   return settings;
 }

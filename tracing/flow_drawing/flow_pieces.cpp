@@ -11,7 +11,7 @@ namespace tensorray {
 namespace {
 
 constexpr std::size_t group_size = 512;  // Triangles; their landings stay in the cache while they are drawn.
-constexpr Detail most_detail = 15;
+constexpr Detail max_detail = 15;
 
 // Light that is drawn at more places than this is faint at each: then it may move by up to two steps between them.
 constexpr double many_places = 128;
@@ -35,7 +35,7 @@ double movement(const FlowMap& map, std::size_t vertex) {
 Detail detail_for(double steps, std::size_t bands, Detail least) {
   if (!std::isfinite(steps)) return 0;
   steps /= std::clamp(steps * static_cast<double>(bands) / many_places, 1.0, 2.0);
-  if (steps > 1) return static_cast<Detail>(std::min<double>(std::ceil(steps) - 1, most_detail));
+  if (steps > 1) return static_cast<Detail>(std::min<double>(std::ceil(steps) - 1, max_detail));
   Detail detail = 0;
   while (detail > least && std::ldexp(steps, 1 - detail) <= 1) --detail;
   return detail;

@@ -17,7 +17,7 @@ using Eigen::Matrix2f;
 using Eigen::Vector2d;
 using Eigen::Vector2f;
 
-constexpr float most_curvature = 0.25f;  // The quadratic part is at most so much of a triangle's size.
+constexpr float max_curvature = 0.25f;  // The quadratic part is at most so much of a triangle's size.
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -114,7 +114,7 @@ class Facet {
       reach = std::max(reach, (b.landing - a.landing).cast<float>().norm());
       bent = std::max(bent, bends_[i].norm());
     }
-    is_curved_ = bent <= most_curvature * reach;  // False for NaN.
+    is_curved_ = bent <= max_curvature * reach;  // False for NaN.
   }
 
   Matrix2f jacobian(const std::array<float, 3>& w) const {
@@ -143,7 +143,7 @@ class Facet {
     Vector2d start = corners_[0].start + double{w[1]} * b + double{w[2]} * c;
     if (!is_curved_) return start;
     const Vector2d back = jacobian(w).cast<double>().inverse() * curve(w).cast<double>();  // Its determinant: any size.
-    if (back.squaredNorm() <= double{most_curvature * most_curvature} * std::abs(cross(b, c))) start -= back;
+    if (back.squaredNorm() <= double{max_curvature * max_curvature} * std::abs(cross(b, c))) start -= back;
     return start;
   }
 

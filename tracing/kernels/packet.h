@@ -55,7 +55,7 @@ constexpr float shortest_step = 1.0f / 1024;
 /// This error must be smaller than rounding errors: it is the same in every step, and they are not.
 constexpr float series_reach[] = {0.00262f, 0.0164f, 0.0514f, 0.1137f, 0.205f,
                                   0.3238f,  0.4688f, 0.6364f, 0.8246f, 1.03f};
-constexpr int most_terms = 11;
+constexpr int max_terms = 11;
 
 constexpr int packet_rays = 32;  // Number of rays in a packet: several vectors.
 using PerRay = float[packet_rays];
@@ -96,8 +96,8 @@ struct alignas(64) Packet {
   std::uint32_t alive = 0;  // One bit for each lane.
   std::uint32_t lands = 0;  // The lanes whose step meets a surface, or a face of the extent.
   int vectors = 0;          // Number of vectors in use.
-  std::uint32_t steps = 0, most_steps = 0;
-  float greatest_reach = 0;
+  std::uint32_t steps = 0, step_limit = 0;
+  float max_reach = 0;
   bool near_surface = false;
   bool straight = false;  // Whether a lane's brick bends nothing.
 };

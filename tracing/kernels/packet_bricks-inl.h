@@ -60,7 +60,7 @@ HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
     greatest = hn::Max(greatest, hn::IfThenElse(hn::Le(reach, most), reach, most));  // NaN counts as strong.
     packet.straight |= !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
   }
-  packet.greatest_reach = hn::GetLane(hn::MaxOfLanes(floats, greatest));
+  packet.max_reach = hn::GetLane(hn::MaxOfLanes(floats, greatest));
 }
 
 /// Finds the box of the voxels, relative to the lanes' bricks.

@@ -153,14 +153,14 @@ void Kernel<components, differentials>::fill(Packet& packet) {
   packet.alive = ~0u >> (packet_rays - count);
   packet.vectors = packet_rays / lanes;
   packet.steps = 0;
-  packet.most_steps = medium_.settings.max_steps;
+  packet.step_limit = medium_.settings.max_steps;
   alignas(64) PerRay norms = {};
   for (int lane = 0; lane < count; ++lane) {
     packet.ray[lane] = static_cast<std::int32_t>(next_++);
     enter(packet, lane);
     const KernelRay& ray = rays_[packet.ray[lane]];
     norms[lane] = ray.norm;
-    packet.most_steps = std::min(packet.most_steps, medium_.settings.max_steps - ray.steps);
+    packet.step_limit = std::min(packet.step_limit, medium_.settings.max_steps - ray.steps);
   }
   for (int i = 0; i < packet_rays; i += lanes) store(index_direction(medium_, load(packet.v, i)), packet.u, i);
   begin_steps(medium_, packet, norms);
@@ -284,7 +284,7 @@ HWY_NOINLINE void Kernel<components, differentials>::step(Packet& packet) {
   for (int axis = 0; axis < 3; ++axis) leave |= outside(medium_, packet, packet.p_next[axis], axis);
   leave &= ~staying;
   stop |= stopped(packet) & ~staying;
-  if (packet.steps >= packet.most_steps) stop |= spent(packet);
+  if (packet.steps >= packet.step_limit) stop |= spent(packet);
   if constexpr (differentials) {  // The reference computes the differentials at a crossing.
     stop |= leave;
     packet.lands |= leave;

@@ -171,7 +171,7 @@ template <int components, bool differentials>
 HWY_INLINE void bend(Packet& packet, const ComposedStep& step, const Tensor& T, const F3& v, float part, F factor,
                      F size, int at) {
   int terms = 2;
-  while (terms < most_terms && !hn::AllTrue(floats, hn::Le(size, set(series_reach[terms - 2])))) ++terms;
+  while (terms < max_terms && !hn::AllTrue(floats, hn::Le(size, set(series_reach[terms - 2])))) ++terms;
   F3 inner = v;  // Horner's rule, from the last term that any lane needs.
   for (int n = terms; n > 2; --n) {
     const F nth = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
@@ -207,7 +207,7 @@ HWY_INLINE void bend(Packet& packet, const ComposedStep& step, const Tensor& T, 
 /// differentiation removes one.
 HWY_INLINE F3 bend_differential(const Tensor& T, const Tensor& dT, const F3& v, const F3& dv, F factor, F size) {
   F3 term = v, sum = v, dterm = dv, dsum = dterm;
-  for (int n = 1; n <= most_terms; ++n) {
+  for (int n = 1; n <= max_terms; ++n) {
     const Mask needed = hn::Gt(size, set(n < 4 ? -1.0f : series_reach[n - 4]));
     if (hn::AllFalse(floats, needed)) break;
     const F part = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
@@ -241,7 +241,7 @@ HWY_INLINE void kick(const PacketMedium& medium, Packet& packet, double part, Co
     const Tensor T = tensor_of<components>([&](int c) HWY_ATTR { return load(packet.tensor[c], i); });
     const F3 before = load(step.v, i);
     F size = load(packet.reach, i);
-    if (HWY_UNLIKELY(!(packet.greatest_reach <= strongest_kick)))
+    if (HWY_UNLIKELY(!(packet.max_reach <= strongest_kick)))
       size = hn::IfThenElse(hn::Le(size, set(strongest_kick)), size, deviator_norm(T, factor));
     bend<components, differentials>(packet, step, T, before, single, factor, size, i);
     if constexpr (differentials) {
@@ -363,9 +363,9 @@ HWY_INLINE void hold(Packet& packet, int lane) {
 HWY_INLINE F growth(F excess) {
   using namespace step_lengths;
   const auto single = [](double value) HWY_ATTR { return set(static_cast<float>(value)); };
-  const F within = hn::Min(hn::Max(excess, single(least_excess)), set(1e30f));
+  const F within = hn::Min(hn::Max(excess, single(min_excess)), set(1e30f));
   const F root = hn::Exp(floats, hn::Mul(single(-1.0 / composed_order), hn::Log(floats, within)));
-  const F factor = hn::Mul(single(composed_safety), root), least = single(least_growth), most = single(most_growth);
+  const F factor = hn::Mul(single(composed_safety), root), least = single(min_growth), most = single(max_growth);
   return hn::IfThenElse(hn::Eq(excess, excess), hn::Min(hn::Max(factor, least), most), least);
 }
 

@@ -41,14 +41,14 @@ struct Clamped {
 
 Clamped clamped(const Basis& axes, const Eigen::Vector3d& V, const CrossSectionSettings& settings) {
   const double longer = settings.scale * axes.col(0).norm(), shorter = settings.scale * axes.col(1).norm();
-  const double shrink = longer > settings.greatest_radius ? settings.greatest_radius / longer : 1;
+  const double shrink = longer > settings.max_radius ? settings.max_radius / longer : 1;
   Clamped result;
   const Eigen::Vector3d across = axes.col(0) - V.dot(axes.col(0)) * V;
   // An ellipse of size zero becomes a circle, of which any diameter is an axis.
   result.major = across.norm() > 0 ? Eigen::Vector3d(across.normalized()) : upright(V, Eigen::Vector3d::UnitY());
   result.minor = V.cross(result.major);
-  result.major_length = std::max(shrink * longer, settings.least_radius);
-  result.minor_length = std::max(shrink * shorter, settings.least_radius);
+  result.major_length = std::max(shrink * longer, settings.min_radius);
+  result.minor_length = std::max(shrink * shorter, settings.min_radius);
   return result;
 }
 
@@ -56,8 +56,8 @@ bool round(const Clamped& e) { return e.major_length - e.minor_length <= negligi
 
 void check(const CrossSectionSettings& settings) {
   if (!(settings.scale > 0)) throw std::invalid_argument("the scale of cross sections must be positive");
-  if (!(settings.least_radius > 0)) throw std::invalid_argument("the least radius of cross sections must be positive");
-  if (!(settings.greatest_radius >= settings.least_radius))
+  if (!(settings.min_radius > 0)) throw std::invalid_argument("the least radius of cross sections must be positive");
+  if (!(settings.max_radius >= settings.min_radius))
     throw std::invalid_argument("the greatest radius of cross sections must not be below the least");
 }
 

@@ -10,9 +10,9 @@ namespace tensorray {
 
 /// How the ellipse of a tensor becomes the cross section of a tube.
 struct CrossSectionSettings {
-  double scale = 1;         ///< World units per unit of T; > 0.
-  double least_radius = 0;  ///< World units; no semi-axis is shorter, so that degenerate ellipses stay visible; > 0.
-  double greatest_radius = 1e300;  ///< World units; larger ellipses shrink to it and keep their shape; >= least_radius.
+  double scale = 1;           ///< World units per unit of T; > 0.
+  double min_radius = 0;      ///< World units; no semi-axis is shorter, so that degenerate ellipses stay visible; > 0.
+  double max_radius = 1e300;  ///< World units; larger ellipses shrink to it and keep their shape; >= min_radius.
 };
 
 /// An ellipse about a point of a path, in the plane normal to the path. It has two pairs of spanning vectors, for two

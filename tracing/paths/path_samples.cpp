@@ -96,7 +96,7 @@ void clear_outside(const JoinedRay& ray, PathSamples& samples) {
 void set_tensors(const TensorField& field, const Eigen::Vector3i& brick, PathSamples& samples) {
   const float* const places = samples.places.data();
   const IndexPoints points{brick, {places, places + samples.room, places + 2 * samples.room}, samples.count};
-  const double greatest = field.greatest_norm();
+  const double greatest = field.max_norm();
   const double factor = 1 / std::max<double>(greatest, std::numeric_limits<float>::min());  // Squares stay in range.
   sample_tensors(field, points, static_cast<float>(factor), samples.tensors.data(), samples.room);
 }

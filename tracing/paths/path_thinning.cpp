@@ -19,7 +19,7 @@
 namespace tensorray {
 namespace {
 
-constexpr float least_square = std::numeric_limits<float>::min();  // No division by zero.
+constexpr float min_square = std::numeric_limits<float>::min();  // No division by zero.
 
 /// Points of a path, and factors that make squares of errors 1 where they are just allowed.
 struct PathInterpolation {
@@ -88,7 +88,7 @@ struct Piece {
 
 /// Of the points between i and j, the one that interpolation between these misses most; of several, the first. The
 /// error is its square.
-Worst most_missed(const PathInterpolation& path, std::size_t i, std::size_t j) {
+Worst max_missed(const PathInterpolation& path, std::size_t i, std::size_t j) {
   const Floats d;
   const Ints ints;
   const Piece piece{path, i, j, 1 / ((path.lengths[j] - path.lengths[i]) + (path.more[j] - path.more[i]))};
@@ -116,7 +116,7 @@ Worst most_missed(const PathInterpolation& path, std::size_t i, std::size_t j) {
 void set_squares(const float* tensors, std::size_t room, float* squares) {
   const Floats d;
   for (std::size_t i = 0; i < room; i += hn::Lanes(d)) {
-    F sum = hn::Set(d, least_square);
+    F sum = hn::Set(d, min_square);
     for (std::size_t c = 0; c < 9; ++c) {
       const F value = hn::LoadU(d, tensors + c * room + i);
       sum = hn::MulAdd(value, value, sum);
@@ -133,7 +133,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tensorray {
 
-HWY_EXPORT(most_missed);
+HWY_EXPORT(max_missed);
 HWY_EXPORT(set_squares);
 
 namespace {
@@ -162,7 +162,7 @@ std::vector<std::size_t> thinned(const PathSamples& samples, double tolerance, d
   }
   return thinned(samples.count, [&](std::size_t first, std::size_t last) -> Worst {
     if (last - first < 2) return {};
-    return HWY_DYNAMIC_DISPATCH(most_missed)(path, first, last);
+    return HWY_DYNAMIC_DISPATCH(max_missed)(path, first, last);
   });
 }
 

@@ -17,18 +17,18 @@ using Eigen::Vector3d;
 constexpr double probe_flexibility = 0.2;
 constexpr double wanted_part = 0.85;   // Of the greatest AutoScale::shown.
 constexpr double tangled_part = 0.75;  // A scale that shows less than this part of a lesser one tangles light.
-constexpr double most_turn = 0.4;      // AutoScale::median_turn; light that turns more leaves the plate.
+constexpr double max_turn = 0.4;       // AutoScale::median_turn; light that turns more leaves the plate.
 constexpr double visible_turn = 0.15;
 constexpr double first_turn = 0.015;  // No ray turns by more at the first scale, radians.
 // A scale that shows less than this, with less turn, is too small. A few rays tell: one of so many.
 constexpr double weak_shown = 0.1, weak_turn = 0.05;
 constexpr std::size_t few = 4;
-constexpr double least_shown = 1e-6, least_gain = 1.5;  // Less may be rounding, or not be what grows with the scale.
+constexpr double min_shown = 1e-6, min_gain = 1.5;  // Less may be rounding, or not be what grows with the scale.
 constexpr int doublings = 30, halvings = 8;
 constexpr int patience = 12;             // Doublings after which light that has not turned at all will not.
 constexpr double smallest_turn = 1e-7;   // Radians; a ray that turns less counts as straight.
 constexpr double plane_distance = 0.25;  // Of the plane, behind the volume, in depths of the volume.
-constexpr double least_slope = 0.1;      // Cosine between light and the plane's normal, for light that lands.
+constexpr double min_slope = 0.1;        // Cosine between light and the plane's normal, for light that lands.
 constexpr std::uint64_t probe_count = 1024;
 constexpr std::size_t probe_batch = 64;  // Rays that one thread traces together.
 
@@ -62,7 +62,7 @@ double log_area(const ProbeBeam& probes, const RayBatch& batch, std::size_t i) {
   const Beam& beam = probes.beam;
   const Vector3d& V = batch.direction[i];
   const double slope = V.dot(beam.direction);
-  if (slope < least_slope) return 0;
+  if (slope < min_slope) return 0;
   const RayDifferential& d = batch.differentials[i];
   const double ahead = (probes.plane - batch.position[i].dot(beam.direction)) / slope;
   const Eigen::Matrix<double, 3, 2> moved = d.position + ahead * d.direction;
@@ -125,11 +125,11 @@ AutoScale probe(const TensorField& field, const Geometry& geometry, const ProbeB
 /// Doubles a scale while a few rays show that it is far too small: that they show little, but more each time.
 double last_weak_scale(const TensorField& field, const Geometry& geometry, const ProbeBeam& probes, double scale,
                        const Progress& progress) {
-  double shown = least_shown;
+  double shown = min_shown;
   for (int i = 0; i < doublings; ++i, scale *= 2) {
     const AutoScale by_few = probe(field, geometry, probes, scale, progress, few);
     const bool is_weak = by_few.shown < weak_shown && by_few.median_turn < weak_turn;
-    if (!is_weak || by_few.shown < least_gain * shown) return i > 0 ? scale / 2 : scale;
+    if (!is_weak || by_few.shown < min_gain * shown) return i > 0 ? scale / 2 : scale;
     shown = by_few.shown;
   }
   return scale;
@@ -148,7 +148,7 @@ AutoScale turned(const std::vector<AutoScale>& tried) {
 }  // namespace
 
 AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress) {
-  const double norm = field.greatest_norm();
+  const double norm = field.max_norm();
   if (norm == 0) return {};
   const ProbeBeam probes = probe_beam(field, beam);
   const double depth = (field.to_world().linear() * field.index_bounds().sizes()).norm();
@@ -159,7 +159,7 @@ AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const
   AutoScale best;
   for (int i = 0; i < doublings; ++i, scale *= 2) {
     tried.push_back(probe(field, geometry, probes, scale, progress));
-    if (tried.size() > 1 && tried.back().median_turn > most_turn) break;
+    if (tried.size() > 1 && tried.back().median_turn > max_turn) break;
     if (tried.back().shown > best.shown) best = tried.back();
     if (tried.back().shown < tangled_part * best.shown) break;
     if (i >= patience && tried.back().bent_fraction == 0) break;

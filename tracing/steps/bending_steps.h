@@ -141,7 +141,7 @@ State<N> splitting4(RayMedium<N>& medium, const State<N>& from, double h, State<
 /// A step of a Runge–Kutta method. Adaptive methods set `error`.
 template <int N>
 State<N> by_stages(const RungeKutta& method, RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
-  std::array<State<N>, RungeKutta::most_stages> k;
+  std::array<State<N>, RungeKutta::max_stages> k;
   const auto along = [&](const double* factors, int count, State<N> to) {
     for (int j = 0; j < count; ++j)
       if (factors[j] != 0) to = to + h * factors[j] * k[j];

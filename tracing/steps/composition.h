@@ -10,16 +10,16 @@ namespace tensorray {
 /// partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142, 2002). Drifts and kicks
 /// alternate, and begin and end with a drift. Negative ones are small.
 struct Composition {
-  static constexpr int most_kicks = 6;
+  static constexpr int max_kicks = 6;
 
   int kicks;
   double longest_kick;
-  double drift[most_kicks + 1], kick[most_kicks];
+  double drift[max_kicks + 1], kick[max_kicks];
 
   /// The error estimate is the difference between the way along the drifts and that by Simpson's rule, from the
   /// directions at the beginning, in the middle and at the end: h Σ_j error[j] V_j. It falls with h^3.5 or faster and
   /// is ten times the error of the step or more.
-  double error[most_kicks + 1];
+  double error[max_kicks + 1];
 };
 
 namespace composition_detail {

@@ -10,19 +10,19 @@ namespace {
 /// This error is far below the single precision of the voxels.
 constexpr double norm_of_terms[] = {1.4142e-06, 0.00018171, 0.0022133, 0.010371, 0.029937, 0.065257, 0.11903,
                                     0.19249,    0.28574,    0.3982,    0.52888,  0.67659,  0.84006,  1};
-constexpr int most_terms = sizeof norm_of_terms / sizeof *norm_of_terms;
+constexpr int max_terms = sizeof norm_of_terms / sizeof *norm_of_terms;
 
 int terms_for(double squared_norm) {
   int terms = 1;
-  while (terms < most_terms && squared_norm > norm_of_terms[terms - 1] * norm_of_terms[terms - 1]) ++terms;
+  while (terms < max_terms && squared_norm > norm_of_terms[terms - 1] * norm_of_terms[terms - 1]) ++terms;
   return terms;
 }
 
 /// exp(A) v by its power series. It uses scalars because this is the innermost loop of tracing.
 Eigen::Vector3d series(const Eigen::Matrix3d& A, const Eigen::Vector3d& v, int terms) {
-  constexpr double reciprocal[most_terms + 1] = {0,        1.0,      1.0 / 2,  1.0 / 3,  1.0 / 4,
-                                                 1.0 / 5,  1.0 / 6,  1.0 / 7,  1.0 / 8,  1.0 / 9,
-                                                 1.0 / 10, 1.0 / 11, 1.0 / 12, 1.0 / 13, 1.0 / 14};
+  constexpr double reciprocal[max_terms + 1] = {0,        1.0,      1.0 / 2,  1.0 / 3,  1.0 / 4,
+                                                1.0 / 5,  1.0 / 6,  1.0 / 7,  1.0 / 8,  1.0 / 9,
+                                                1.0 / 10, 1.0 / 11, 1.0 / 12, 1.0 / 13, 1.0 / 14};
   double x = v.x(), y = v.y(), z = v.z(), sum_x = x, sum_y = y, sum_z = z;
   for (int k = 1; k <= terms; ++k) {
     const double r = reciprocal[k];
@@ -42,7 +42,7 @@ Eigen::Matrix3d squared(const Eigen::Matrix3d& A, double norm, double& log_scale
   const Eigen::Matrix3d small = std::ldexp(1.0, -halvings) * A;
   Eigen::Matrix3d power;
   for (int column = 0; column < 3; ++column)
-    power.col(column) = series(small, Eigen::Vector3d::Unit(column), most_terms);
+    power.col(column) = series(small, Eigen::Vector3d::Unit(column), max_terms);
   log_scale = 0;
   for (int i = 0; i < halvings; ++i) {
     power = (power * power).eval();
@@ -95,7 +95,7 @@ Eigen::Matrix3d exponential_derivatives(const Eigen::Matrix3d& A, const std::arr
   const Eigen::Matrix3d without_trace = deviator(A);
   const double squared_norm = without_trace.squaredNorm();
   // One more term, because differentiation of the series removes one.
-  if (squared_norm <= 1) return series(without_trace, dA, v, std::min(terms_for(squared_norm) + 1, most_terms));
+  if (squared_norm <= 1) return series(without_trace, dA, v, std::min(terms_for(squared_norm) + 1, max_terms));
   const int halvings = std::isfinite(squared_norm) ? std::ilogb(std::sqrt(squared_norm)) + 1 : 0;
   const double part = std::ldexp(1.0, -halvings);
   const std::array<Eigen::Matrix3d, 2> small{part * dA[0], part * dA[1]};
@@ -104,7 +104,7 @@ Eigen::Matrix3d exponential_derivatives(const Eigen::Matrix3d& A, const std::arr
   for (int column = 0; column < 3; ++column) {
     Eigen::Matrix3d unit = Eigen::Matrix3d::Zero();
     unit(column, 0) = 1;
-    const Eigen::Matrix3d applied = series(part * without_trace, small, unit, most_terms);
+    const Eigen::Matrix3d applied = series(part * without_trace, small, unit, max_terms);
     power.col(column) = applied.col(0);
     change[0].col(column) = applied.col(1);
     change[1].col(column) = applied.col(2);

@@ -8,13 +8,13 @@ namespace tensorray {
 
 /// An explicit method: stage i is at x + h Σ_j a[i][j] k_j, and the step ends at x + h Σ_j b[j] k_j.
 struct RungeKutta {
-  static constexpr int most_stages = 7;
+  static constexpr int max_stages = 7;
 
   int stages, order;
-  double a[most_stages][most_stages];
-  double b[most_stages];
+  double a[max_stages][max_stages];
+  double b[max_stages];
   bool adaptive;
-  double error[most_stages];  ///< Adaptive methods: h Σ_j error[j] k_j is the difference from the embedded method.
+  double error[max_stages];  ///< Adaptive methods: h Σ_j error[j] k_j is the difference from the embedded method.
 };
 
 inline constexpr RungeKutta rk4_method{/*stages*/ 4,

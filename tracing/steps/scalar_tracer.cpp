@@ -245,9 +245,8 @@ double Tracer<N>::control_step(const State<N>& error) {
   using namespace step_lengths;
   const double excess = std::max(error.position().norm() / voxel_, error.direction().norm()) / settings_.tolerance;
   const double order = is_composed() ? composed_order : runge_kutta(settings_.method)->order;
-  const double factor =
-      (is_composed() ? composed_safety : safety) * std::pow(std::max(excess, least_excess), -1 / order);
-  const double growth = factor > least_growth ? std::min(factor, most_growth) : least_growth;
+  const double factor = (is_composed() ? composed_safety : safety) * std::pow(std::max(excess, min_excess), -1 / order);
+  const double growth = factor > min_growth ? std::min(factor, max_growth) : min_growth;
   const double longest = is_composed() ? longest_composed : settings_.step > 0 ? settings_.step : longest_adaptive;
   adaptive_step_ = std::clamp(adaptive_step_ * growth, shortest_adaptive, longest);
   return excess;

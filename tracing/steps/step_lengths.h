@@ -17,12 +17,12 @@ constexpr double strongest_composed = 1.25;  ///< As strongest_kick, for its fir
 constexpr double past_straight_brick = 1.0 / 64, past_straight_brick_by_stages = 1e-5;
 
 /// The next step of an adaptive method is the last step times safety · excess^(-1 / order), limited to the range from
-/// least_growth to most_growth. `excess` is the error of the last step divided by the tolerance. If it is NaN, the
-/// factor is least_growth.
-constexpr double safety = 0.9, least_growth = 0.2, most_growth = 5;
+/// min_growth to max_growth. `excess` is the error of the last step divided by the tolerance. If it is NaN, the
+/// factor is min_growth.
+constexpr double safety = 0.9, min_growth = 0.2, max_growth = 5;
 constexpr double composed_safety = 0.7;  ///< Of `splitting4`: steps are then hardly ever repeated, so that rays depend
                                          ///< smoothly on their start and flexibility.
 constexpr int composed_order = 4;
-constexpr double least_excess = 1e-10;  ///< Smaller values of `excess` count as this one.
+constexpr double min_excess = 1e-10;  ///< Smaller values of `excess` count as this one.
 
 }  // namespace tensorray::step_lengths

@@ -15,9 +15,9 @@ namespace {
 using packets::KernelRay;
 using packets::KernelSettings;
 
-constexpr double face_margin = 1e-3;      // Voxels; above the error of single precision.
-constexpr double least_tolerance = 1e-5;  // Of automatic steps; below it, errors of single precision would show.
-constexpr double surface_margin = 4e-6;   // In sizes of the volume; above the margin of Geometry.
+constexpr double face_margin = 1e-3;     // Voxels; above the error of single precision.
+constexpr double min_tolerance = 1e-5;   // Of automatic steps; below it, errors of single precision would show.
+constexpr double surface_margin = 4e-6;  // In sizes of the volume; above the margin of Geometry.
 
 /// A box around the surfaces that rays may meet within the field, in index space; empty if there are none.
 Eigen::AlignedBox3d surfaces_within(const TensorField& field, const Geometry& geometry) {
@@ -227,7 +227,7 @@ bool trace_in_packets(const TensorField& field, const Geometry& geometry, const 
                       RayBatch& batch, RayRecord* records) {
   const bool is_given = settings.step > 0;
   const bool fits = settings.method == BendingMethod::splitting4
-                        ? is_given || settings.tolerance >= least_tolerance
+                        ? is_given || settings.tolerance >= min_tolerance
                         : settings.method == BendingMethod::splitting && is_given;
   if (!fits || !field.is_cubic() || packets::lane_count() == 1) return false;
   if (batch.differentials.empty())

@@ -3,7 +3,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double greatest_table = 32;  // Table entries per brick, at most; an entry takes eight bytes.
+constexpr double max_table = 32;  // Table entries per brick, at most; an entry takes eight bytes.
 
 }  // namespace
 
@@ -12,7 +12,7 @@ BrickIndex::BrickIndex(const std::vector<Eigen::Vector3i>& bricks) {
   Eigen::AlignedBox3i box;
   for (const Eigen::Vector3i& brick : bricks) box.extend(brick);
   const Eigen::Vector3d size = box.max().cast<double>() - box.min().cast<double>() + Eigen::Vector3d::Ones();
-  if (size.prod() <= greatest_table * static_cast<double>(bricks.size()))
+  if (size.prod() <= max_table * static_cast<double>(bricks.size()))
     make_table(bricks, box);
   else
     make_slots(bricks);

@@ -17,7 +17,7 @@ constexpr int cells = TensorBrick::cells;
 static_assert(cells == TensorBlock::size, "a brick holds a block and the near faces of its neighbours");
 
 /// In double precision, for values of any size; NaN counts as zero.
-double greatest_squared_norm(const TensorBlock& block) {
+double max_squared_norm(const TensorBlock& block) {
   double greatest = 0;
   for (const Eigen::Matrix3f& value : block.values) greatest = std::max(greatest, value.cast<double>().squaredNorm());
   return greatest;
@@ -25,7 +25,7 @@ double greatest_squared_norm(const TensorBlock& block) {
 
 /// @param norm  The greatest squared norm of a block's tensors in single precision.
 double squared_norm(float norm, const TensorBlock& block) {
-  return norm > least_square && norm < greatest_square ? double{norm} : greatest_squared_norm(block);
+  return norm > min_square && norm < max_square ? double{norm} : max_squared_norm(block);
 }
 
 std::uint32_t bits_of(float number) {

@@ -17,7 +17,7 @@
 namespace tensorray {
 
 /// Outside this range, sums of squares in single precision may be wrong: a term may underflow or overflow.
-constexpr float least_square = 1e-25f, greatest_square = 1e30f;
+constexpr float min_square = 1e-25f, max_square = 1e30f;
 
 /// Finds blocks by their places (index of the first voxel / 8). Does not own the shapes.
 struct BlockTable {
@@ -56,7 +56,7 @@ struct Deviators {
 
   /// Whether no square underflows or overflows, nearly. In single precision the error is then below 2e-6, because the
   /// trace takes at most two thirds of the squares away.
-  bool are_exact() const { return greatest > Number(least_square) && squares < Number(greatest_square); }
+  bool are_exact() const { return greatest > Number(min_square) && squares < Number(max_square); }
 };
 
 /// TensorBrick::strongest, given the square. Rounded up, because interpolation may round to slightly more than the

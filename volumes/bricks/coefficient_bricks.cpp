@@ -119,7 +119,7 @@ bool reaches(const VoxelMask& mask, const Vector3i& offset, const Apron& apron) 
 
 /// Three slabs are in use at a time: one is solved, and bricks are made of the one before it with what they need of a
 /// third. With a bound of memory, these may take half of it.
-std::size_t most_places_of_slab() {
+std::size_t max_places_of_slab() {
   const std::size_t bytes = memory_bound() ? *memory_bound() / 12 : std::size_t{1} << 26;
   return bytes / (static_cast<std::size_t>(CoefficientBlock::stored_floats(TensorBrick::general)) * sizeof(float));
 }
@@ -174,7 +174,7 @@ CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i
   result.count = result.places.size();
   result.places.insert(result.places.end(), others.begin(), others.end());
   result.index = BrickIndex(result.places);
-  result.slabs = slabs_of(result.places, most_places_of_slab());
+  result.slabs = slabs_of(result.places, max_places_of_slab());
   for (const Vector3i& place : result.places) {
     const std::uint32_t at = found.find(place);
     result.filled.push_back(at == BrickIndex::missing ? VoxelMask{} : filled[at]);

@@ -76,7 +76,7 @@ TensorField::TensorField(const BlockSource& source, const Interpolant& interpola
   continue_values(coefficients);
   const std::vector<float> strongest = make_coefficients(coefficients, memory_);
   keep_bricks(memory_, bricks.count);
-  greatest_norm_ = std::sqrt(*std::max_element(norms.begin(), norms.end()));
+  max_norm_ = std::sqrt(*std::max_element(norms.begin(), norms.end()));
   bricks_.assign(bricks.places.begin(), bricks.places.begin() + static_cast<std::ptrdiff_t>(bricks.count));
   index_ = BrickIndex(bricks_);
   index_.set_values(strongest);
@@ -91,7 +91,7 @@ TensorField::TensorField(FieldParts parts)
       voxels_(parts.voxels.cast<double>()),
       bricks_(std::move(parts.bricks)),
       memory_(std::move(parts.memory)),
-      greatest_norm_(parts.greatest_norm),
+      max_norm_(parts.max_norm),
       index_(bricks_) {
   index_.set_values(parts.strongest);
   set_trailing_offset();

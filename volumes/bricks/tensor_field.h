@@ -60,7 +60,7 @@ struct FieldParts {
   std::vector<Eigen::Vector3i> bricks;  ///< As `TensorField::bricks`.
   std::vector<float> strongest;         ///< TensorBrick::strongest of each.
   BrickMemory memory;                   ///< In the order of `bricks`.
-  double greatest_norm = 0;
+  double max_norm = 0;
 };
 
 /// A field as bricks in memory. Its size grows with the number of active voxels, not with the extent. Immutable; any
@@ -100,7 +100,7 @@ class TensorField {
   bool contains(const Eigen::Vector3d& world) const { return index_bounds_.contains(to_index_ * world); }
 
   /// The greatest Frobenius norm of all voxels.
-  double greatest_norm() const { return greatest_norm_; }
+  double max_norm() const { return max_norm_; }
 
   /// Whether T = Tᵀ in all voxels, bit for bit. Bricks then store five components, and tracing is faster.
   bool is_symmetric() const { return memory_.components == TensorBrick::symmetric; }
@@ -145,7 +145,7 @@ class TensorField {
   std::vector<Eigen::Vector3i> bricks_;
   BrickMemory memory_;  ///< In the order of `bricks_`.
   std::size_t trailing_offset_ = 0;
-  double greatest_norm_ = 0;
+  double max_norm_ = 0;
   BrickIndex index_;  ///< Finds a brick, and its TensorBrick::strongest, by its coordinates.
 };
 

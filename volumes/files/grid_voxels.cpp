@@ -15,7 +15,7 @@ namespace tensorray {
 namespace {
 
 /// More blocks than fit in any machine's memory. An active tile at the root of a tree would expand to as many.
-constexpr std::size_t greatest_block_count = std::size_t{1} << 25;
+constexpr std::size_t max_block_count = std::size_t{1} << 25;
 
 /// Calls `visit(tree)` with the grid's tree as its actual type.
 template <class Visit>
@@ -36,7 +36,7 @@ void add_tile_origins(const std::filesystem::path& path, const Tree& tree, std::
     tile.getBoundingBox(box);
     require_extent(path, index_of(box.min()), index_of(box.max()));  // The loops below would overflow.
     const std::size_t count = origins.size() + box.volume() / TensorBlock::voxels;
-    if (count > greatest_block_count) throw std::bad_alloc();
+    if (count > max_block_count) throw std::bad_alloc();
     require_memory(path, count, sizeof(openvdb::Coord));
     for (int x = box.min().x(); x <= box.max().x(); x += size)
       for (int y = box.min().y(); y <= box.max().y(); y += size)

@@ -18,10 +18,10 @@
 namespace tensorray {
 namespace {
 
-constexpr double greatest_half = 65504;
+constexpr double max_half = 65504;
 
 /// What a field needs at least for a block, when its tensors are symmetric (TensorBrick).
-constexpr std::size_t least_brick_bytes = 14000;
+constexpr std::size_t min_brick_bytes = 14000;
 
 /// Whether two transforms differ by less than a millionth of a voxel per voxel, and by less than a thousandth of a
 /// voxel anywhere.
@@ -159,7 +159,7 @@ class RowGrid : public openvdb::Vec3SGrid {
 void check_half_range(const std::filesystem::path& path, const TensorGrid& grid) {
   tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
     for (const Eigen::Matrix3f& value : grid.blocks[i].values)
-      if ((value.array().abs() > greatest_half).any())
+      if ((value.array().abs() > max_half).any())
         fail(path, "a component exceeds 65504, the greatest 16-bit float; write single precision or scale the field");
   });
 }
@@ -179,7 +179,7 @@ BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string
   result.metadata = metadata_of(file.metadata, *grids.front().file.grid);
   const bool derives = derive != Derive::none;
   try {
-    result.shapes = find_blocks(path, grids, derives ? sizeof(SampleBlock) : least_brick_bytes);
+    result.shapes = find_blocks(path, grids, derives ? sizeof(SampleBlock) : min_brick_bytes);
     if (result.shapes.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
     if (derives) return derived_source(path, grids, derive, result);
   } catch (const std::bad_alloc&) {

@@ -214,7 +214,7 @@ class TileSmoothing {
 }  // namespace
 
 void smooth(TensorGrid& grid, double deviation) {
-  if (!(deviation >= 0 && deviation <= greatest_smoothing))
+  if (!(deviation >= 0 && deviation <= max_smoothing))
     throw std::invalid_argument("smooth: the deviation must be 0 to 20 voxels");
   const Kernel kernel(deviation);
   if (kernel.radius == 0 || grid.blocks.empty()) return;

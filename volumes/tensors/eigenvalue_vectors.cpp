@@ -205,7 +205,7 @@ void compute(TensorVectors& tensors, int first, bool positive) {
     on_cut = hn::AndNot(symmetric, on_cut);
   }
   evaluate(f, T, R);
-  const M grows = hn::Not(hn::Le(squared_norm(R), set(greatest_growth * greatest_growth)));
+  const M grows = hn::Not(hn::Le(squared_norm(R), set(max_growth * max_growth)));
   is_left = hn::Or(is_left, hn::AndNot(symmetric, grows));
   for (int i = 0; i < 9; ++i) {
     R[i] = hn::Mul(R[i], norm);

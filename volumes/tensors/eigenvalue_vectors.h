@@ -12,7 +12,7 @@ constexpr double eigenvalue_tolerance = 1e-6;
 
 /// Near a nilpotent Jordan block of three rows |·| has no limit and may grow as 1/|λ|. A result whose norm is more than
 /// this multiple of the tensor's norm fades to zero, which is the value on the block itself.
-constexpr double greatest_growth = 4;
+constexpr double max_growth = 4;
 
 /// Tensors side by side, component by component. (|T|ᵀ = |Tᵀ|, so that rows and columns may change places.)
 struct TensorVectors {

@@ -119,7 +119,7 @@ Matrix3d general_with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool
     result = mode == Eigenvalues::absolute ? absolute_of_pair(tensor, real, values[upper])
                                            : positive_of_pair(tensor, real, values[upper], limit_taken);
   }
-  const double growth = result.norm() / greatest_growth;
+  const double growth = result.norm() / max_growth;
   if (growth <= 1) return result;
   limit_taken = true;
   return result / (growth * growth);

@@ -16,7 +16,7 @@ namespace tensorray {
 namespace {
 
 /// Imaginary parts, and negative real parts, below this fraction of a tensor's norm count as rounding errors.
-constexpr double least_part = 1e-6;
+constexpr double min_part = 1e-6;
 
 double spectral_norm(const Eigen::Matrix3d& tensor) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tensor.transpose() * tensor, Eigen::EigenvaluesOnly);
@@ -43,8 +43,8 @@ void add_voxel(const Eigen::Matrix3d& tensor, BlockStatistics& statistics) {
   statistics.real_max = std::max(statistics.real_max, values[0].real());
   statistics.real_min = std::min(statistics.real_min, values[2].real());
   statistics.imaginary_max = std::max(statistics.imaginary_max, imaginary);
-  statistics.complex += imaginary > least_part * norm;
-  statistics.negative += values[2].real() < -least_part * norm;
+  statistics.complex += imaginary > min_part * norm;
+  statistics.negative += values[2].real() < -min_part * norm;
 
   const Eigen::Matrix3d deviator = tensor - tensor.trace() / 3 * Eigen::Matrix3d::Identity();
   if (deviator.norm() > statistics.deviator_max)  // The spectral norm is never above the Frobenius norm.

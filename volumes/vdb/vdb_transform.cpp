@@ -8,7 +8,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double least_determinant = 1e-14;  // OpenVDB's own limit is 3e-15.
+constexpr double min_determinant = 1e-14;  // OpenVDB's own limit is 3e-15.
 
 /// OpenVDB multiplies row vectors from the left, Eigen column vectors from the right.
 openvdb::Mat4d to_openvdb(const Eigen::Affine3d& affine) {
@@ -38,7 +38,7 @@ double length_unit(const std::filesystem::path& path, const openvdb::GridBase& g
 }  // namespace
 
 LengthUnit length_unit_for(double determinant) {
-  if (!(std::abs(determinant) < least_determinant) || determinant == 0) return {};
+  if (!(std::abs(determinant) < min_determinant) || determinant == 0) return {};
   const std::string text = "1e" + std::to_string(static_cast<int>(std::floor(std::log10(std::abs(determinant)) / 3)));
   return {std::stod(text), text};  // The number that a reader gets.
 }

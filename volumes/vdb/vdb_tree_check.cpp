@@ -23,7 +23,7 @@ enum NodeFlag : int {
 
 constexpr std::size_t window = 1 << 16;  // Bytes that are read at once.
 
-constexpr std::int64_t greatest_chunk = 1 << 20;  // More than leaves have.
+constexpr std::int64_t max_chunk = 1 << 20;  // More than leaves have.
 
 /// One bit for each value of a node.
 template <std::size_t Count>
@@ -126,7 +126,7 @@ class TreeParser {
       if (stored != -expected) throw FormatError();
       return in_.skip(expected);
     }
-    if (stored > greatest_chunk) throw FormatError();
+    if (stored > max_chunk) throw FormatError();
     if (!tree_.blosc) return in_.skip(stored);
     if (stored < blosc_header || !blosc_fits(in_.next(blosc_header), stored, expected)) throw FormatError();
     in_.skip(stored - blosc_header);

@@ -10,8 +10,8 @@
 namespace tensorray {
 
 void require_extent(const std::filesystem::path& path, const Eigen::Vector3i& min, const Eigen::Vector3i& max) {
-  if ((min.array() >= -greatest_index).all() && (max.array() <= greatest_index).all()) return;
-  fail(path, "has voxels whose indices are beyond " + std::to_string(greatest_index) +
+  if ((min.array() >= -max_index).all() && (max.array() <= max_index).all()) return;
+  fail(path, "has voxels whose indices are beyond " + std::to_string(max_index) +
                  "; the file is damaged, or its grid has to be moved to the origin");
 }
 

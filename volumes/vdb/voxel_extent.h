@@ -10,9 +10,9 @@
 
 namespace tensorray {
 
-/// Voxels may have indices from −greatest_index to greatest_index along each axis. Then sizes, and the indices of
+/// Voxels may have indices from −max_index to max_index along each axis. Then sizes, and the indices of
 /// neighbours, are integers of 32 bits. 2²⁹ voxels of a micrometre are half a kilometre.
-constexpr std::int32_t greatest_index = 1 << 29;
+constexpr std::int32_t max_index = 1 << 29;
 
 /// @param min, max  Indices of voxels. @throw std::runtime_error naming the file, if one of them is out of range.
 void require_extent(const std::filesystem::path& path, const Eigen::Vector3i& min, const Eigen::Vector3i& max);

@@ -31,7 +31,7 @@ void expect_in_aperture(const Beam& beam, const std::vector<Vector3d>& seeds) {
   }
 }
 
-double least_distance(const std::vector<Vector3d>& seeds) {
+double min_distance(const std::vector<Vector3d>& seeds) {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < seeds.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) least = std::min(least, (seeds[i] - seeds[j]).norm());
@@ -44,7 +44,7 @@ TEST(Seeds, AGridFillsTheAperture) {
   EXPECT_NEAR(double(seeds.size()), 400, 40);  // There may be one row of 20 more or less at each of two edges.
   expect_in_aperture(beam, seeds);
   // Cells are nearly squares of area / 400, and their edges differ by at most half a cell in 20.
-  EXPECT_NEAR(least_distance(seeds), std::sqrt(area(beam.aperture) / 400), 0.1 * std::sqrt(area(beam.aperture) / 400));
+  EXPECT_NEAR(min_distance(seeds), std::sqrt(area(beam.aperture) / 400), 0.1 * std::sqrt(area(beam.aperture) / 400));
 }
 
 TEST(Seeds, PoissonDisksAreApartAndFillTheAperture) {
@@ -53,7 +53,7 @@ TEST(Seeds, PoissonDisksAreApartAndFillTheAperture) {
     const std::vector<Vector3d> seeds = poisson_disk_seeds(beam, count, 5);
     ASSERT_EQ(seeds.size(), count);
     expect_in_aperture(beam, seeds);
-    EXPECT_GE(least_distance(seeds), 0.75 * std::sqrt(area(beam.aperture) / double(count)));
+    EXPECT_GE(min_distance(seeds), 0.75 * std::sqrt(area(beam.aperture) / double(count)));
   }
   const std::vector<Vector3d> seeds = poisson_disk_seeds(beam, 600, 5);
   EXPECT_EQ(seeds, poisson_disk_seeds(beam, 600, 5));

@@ -85,7 +85,7 @@ Vector3d lab(const Matrix3d& rgb_to_xyz, const Vector3d& rgb) {
 
 /// The smallest distance to a colour that any reflectances of the bands within [0, 1], smooth or not, can reach. A
 /// convex problem, solved by optimising one band after the other.
-double least_distance(const Scene& scene, const Vector3d& rgb) {
+double min_distance(const Scene& scene, const Vector3d& rgb) {
   std::vector<double> reflectances(scene.bands.size(), 0);
   Vector3d residual = -rgb;
   for (double before = std::numeric_limits<double>::max(); residual.norm() < before - 1e-7;) {
@@ -120,7 +120,7 @@ TEST(ReflectanceTest, WideGamutComesAsNearAsAnyReflectance) {
   int out_of_reach = 0;
   const Scene scene = make_scene(illuminant("D65"), 16, rec709_to_acescg());
   for (const Vector3d& rgb : cube(6)) {
-    const double least = least_distance(scene, rgb);
+    const double least = min_distance(scene, rgb);
     out_of_reach += least > 1e-3;
     EXPECT_LT((scene.color(scene.model.spectrum(rgb)) - rgb).norm(), least + 0.01) << rgb.transpose();
   }

@@ -147,7 +147,7 @@ TEST(TubeMesh, CurvedAndTwistedTubesAreWatertight) {
 TEST(TubeMesh, RoundCapsAreHalfBalls) {
   const double r = 0.4, length = 2;
   TubeSettings settings = settings_of(TubeStyle::solid, TubeCaps::round, 1e-4);
-  settings.most_segments = 200;
+  settings.max_segments = 200;
   const TubeMesh tubes = make_tube_mesh({straight_tube(r, r, length, 2)}, settings);
   // The inscribed surface is off by up to the tolerance, in a dome by up to twice the tolerance.
   EXPECT_NEAR(volume(tubes.mesh), pi * r * r * length + 4.0 / 3 * pi * r * r * r,
@@ -167,7 +167,7 @@ TEST(TubeMesh, RingsAreAddedWhereATubeBends) {
   double last = 1;
   for (const double tolerance : {0.02, 0.002, 0.0002}) {
     TubeSettings settings = settings_of(TubeStyle::solid, TubeCaps::flat, tolerance);
-    settings.most_segments = 400;
+    settings.max_segments = 400;
     const TubeMesh tubes = make_tube_mesh({arc(r, pi / 2, 4)}, settings);
     const double error = std::abs(volume(tubes.mesh) - exact);
     // The side is off by the tolerance.
@@ -238,7 +238,7 @@ TEST(TubeMesh, DiscsAreSeparateEllipses) {
   TubeSettings settings = settings_of(TubeStyle::discs, TubeCaps::flat, 1e-4);
   settings.spacing = 0.5;
   settings.thickness = 0.02;
-  settings.most_segments = 200;
+  settings.max_segments = 200;
   const TubeMesh discs = make_tube_mesh({straight_tube(0.3, 0.2, 2, 3)}, settings);
   expect_watertight(discs.mesh, 2 * 5);
   expect_normals_outwards(discs);
@@ -279,9 +279,9 @@ TEST(TubeMesh, TheNumberOfTrianglesIsBounded) {
   for (const TubeStyle style : {TubeStyle::solid, TubeStyle::wire, TubeStyle::discs}) {
     TubeSettings settings = settings_of(style, TubeCaps::flat);
     const std::size_t needed = make_tube_mesh({tube, tube}, settings).mesh.triangles.size();
-    settings.most_triangles = needed;
+    settings.max_triangles = needed;
     EXPECT_EQ(make_tube_mesh({tube, tube}, settings).mesh.triangles.size(), needed);
-    settings.most_triangles = needed - 1;
+    settings.max_triangles = needed - 1;
     EXPECT_THROW(make_tube_mesh({tube, tube}, settings), std::runtime_error);
   }
   // The settings must be refused at once: building the mesh would take weeks.
@@ -302,10 +302,10 @@ TEST(TubeMesh, RefusesWhatIsOutOfRange) {
   };
   refused([](TubeSettings& s) { s.tolerance = -1; });
   refused([](TubeSettings& s) { s.spacing = std::nan(""); });
-  refused([](TubeSettings& s) { s.least_segments = 2; });
-  refused([](TubeSettings& s) { s.most_segments = 5; });
+  refused([](TubeSettings& s) { s.min_segments = 2; });
+  refused([](TubeSettings& s) { s.max_segments = 5; });
   refused([](TubeSettings& s) { s.lines = -1; });
-  refused([](TubeSettings& s) { s.most_triangles = std::uint64_t{1} << 32; });
+  refused([](TubeSettings& s) { s.max_triangles = std::uint64_t{1} << 32; });
   Tube flat = tube;
   flat[1].y = flat[1].x;
   EXPECT_THROW(make_tube_mesh({flat}, {}), std::invalid_argument);

@@ -33,7 +33,7 @@ Film histogram(const FlowBench& bench, double flexibility, std::uint64_t photons
 }
 
 /// The greatest value of a pixel and its eight neighbours.
-double greatest_near(const Film& film, int x, int y) {
+double max_near(const Film& film, int x, int y) {
   double greatest = 0;
   for (int v = std::max(0, y - 1); v < std::min(film.height, y + 2); ++v)
     for (int u = std::max(0, x - 1); u < std::min(film.width, x + 2); ++u)
@@ -55,7 +55,7 @@ void expect_same_light(const FlowBench& bench, double flexibility, const char* l
   for (int y = 0; y < expected.height; ++y)
     for (int x = 0; x < expected.width; ++x) {
       const double light = caustic.irradiance.plane(0)[y * expected.width + x];
-      const double moved = settings.tolerance * greatest_near(caustic.irradiance, x, y);
+      const double moved = settings.tolerance * max_near(caustic.irradiance, x, y);
       const double noise = std::sqrt(std::max(light, per_photon) * per_photon) + moved;
       squares += std::pow((light - expected.plane(0)[y * expected.width + x]) / noise, 2);
     }
@@ -319,7 +319,7 @@ TEST(FlowMap, KeepsToItsNumberOfVertices) {
   const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 512));
   for (const std::size_t most : {1u, 100u, 3000u}) {
     FlowSettings settings = single(0.4);
-    settings.most_starts = most;
+    settings.max_starts = most;
     const FlowMap map = map_of(bench, settings);
     EXPECT_LT(map.starts.size(), 2 * most + 64);  // Vertices in the middles of quads come on top.
     EXPECT_FALSE(map.is_complete);
@@ -339,7 +339,7 @@ TEST(FlowMap, BadSettingsAreRefused) {
   settings.tolerance = std::nan("");
   EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
   settings = single(0.1);
-  settings.most_starts = 0;
+  settings.max_starts = 0;
   EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
 }
 

@@ -216,7 +216,7 @@ TEST_P(PacketKernel, EndsAsTheReferenceDoesInOddFields) {
     std::size_t compared = 0;
     for (std::size_t i = 0; i < exact.size(); ++i) {
       EXPECT_TRUE(fast.position[i].allFinite() && fast.direction[i].allFinite()) << i;
-      const bool follows = std::abs(scene.rays.flexibility[i]) * scene.field.greatest_norm() * mean_edge < 10;
+      const bool follows = std::abs(scene.rays.flexibility[i]) * scene.field.max_norm() * mean_edge < 10;
       if (moved.end[i] != exact.end[i] || !follows) continue;
       ++compared;
       EXPECT_EQ(fast.end[i], exact.end[i]) << "ray " << i << ", s " << scene.rays.flexibility[i];

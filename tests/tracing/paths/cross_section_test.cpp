@@ -17,8 +17,8 @@ using Eigen::Vector3d;
 
 CrossSectionSettings radii(double least, double greatest = 1e300) {
   CrossSectionSettings settings;
-  settings.least_radius = least;
-  settings.greatest_radius = greatest;
+  settings.min_radius = least;
+  settings.max_radius = greatest;
   return settings;
 }
 

@@ -114,7 +114,7 @@ TEST_P(PathThinning, SamplesAreThePointsOfTheRay) {
     };
     EXPECT_LT((mean_edge * moved(0) - (points[i].position - points[0].position)).norm(), 1e-5 * mean_edge);
     EXPECT_NEAR(at(samples.lengths, 0) + at(samples.more, 0), points[i].length - points[0].length, 1e-9);
-    const Matrix3d T = sampler.at(points[i].position) / traced.field.greatest_norm();
+    const Matrix3d T = sampler.at(points[i].position) / traced.field.max_norm();
     for (std::size_t c = 0; c < 9; ++c) {
       EXPECT_NEAR(at(samples.tensors, c), points[i].in_field ? T.data()[c] : 0, 1e-5);
     }

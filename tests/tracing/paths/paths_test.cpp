@@ -323,7 +323,7 @@ TEST(Paths, AStraightFieldMakesStraightCircularTubes) {
   ASSERT_EQ(path.points.size(), 2u);
   CrossSectionSettings sizes;
   sizes.scale = 0.05;
-  sizes.least_radius = 1e-3;
+  sizes.min_radius = 1e-3;
   Tube tube;
   for (const CrossSection& section : cross_sections(path.points, sizes))
     tube.push_back({path.points[tube.size()].position, section.x, section.y, 0});

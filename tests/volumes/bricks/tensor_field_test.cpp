@@ -148,7 +148,7 @@ TEST(TensorField, KnowsItsGreatestNorm) {
   const TensorField field(dense_grid(box({0, 0, 0}, {4, 4, 4}), Eigen::Affine3d::Identity(), [](const Vector3i& i) {
     return Matrix3d((i.sum() == 12 ? -2.5 : 1) * Matrix3d::Identity());
   }));
-  EXPECT_NEAR(field.greatest_norm(), 2.5 * std::sqrt(3.0), 1e-6);
+  EXPECT_NEAR(field.max_norm(), 2.5 * std::sqrt(3.0), 1e-6);
 }
 
 /// The Frobenius norm, in double precision, of the tensor of a voxel.

@@ -42,7 +42,7 @@ void expect_same_bricks(const TensorField& a, const TensorField& b) {
   ASSERT_EQ(a.bricks(), b.bricks());
   EXPECT_EQ(a.index_bounds().min(), b.index_bounds().min());
   EXPECT_EQ(a.index_bounds().max(), b.index_bounds().max());
-  EXPECT_EQ(a.greatest_norm(), b.greatest_norm());
+  EXPECT_EQ(a.max_norm(), b.max_norm());
   for (const Vector3i& place : a.bricks()) {
     const TensorBrick one = a.brick(place), other = b.brick(place);
     EXPECT_EQ(one.strongest, other.strongest);

@@ -86,7 +86,7 @@ TEST(SampleTensors, AgreesWithTheSamplerOfOnePoint) {
           const Matrix3d expected = 0.5 * sampler.at(field.to_world() * points[i]);
           const Matrix3d found = Eigen::Map<const Eigen::Matrix3f>(tensors[i].data()).cast<double>();
           // Positions are rounded to 4e-6 of a voxel; neighbouring voxels differ by up to twice the greatest norm.
-          ASSERT_LT((found - expected).norm(), 1e-5 * field.greatest_norm())
+          ASSERT_LT((found - expected).norm(), 1e-5 * field.max_norm())
               << points[i].transpose() << " in " << first.transpose() << " to " << last.transpose();
         }
       }

@@ -44,7 +44,7 @@ double area(const Isosurface& surface) {
   return sum;
 }
 
-double greatest_radius_error(const Isosurface& surface, double radius) {
+double max_radius_error(const Isosurface& surface, double radius) {
   double error = 0;
   for (const Vector3d& vertex : surface.mesh.vertices)
     error = std::max(error, std::abs((vertex - center).norm() - radius));
@@ -82,7 +82,7 @@ TEST(IsosurfaceTest, SphereOfSecondOrder) {
     const Isosurface surface = isosurface(cube(n), Invariant::largest_eigenvalue, radius);
     EXPECT_EQ(open_edges(surface), 0);
     expect_inwards(surface, 2 * h * h / (radius * radius));
-    radius_error[i] = greatest_radius_error(surface, radius);
+    radius_error[i] = max_radius_error(surface, radius);
     area_error[i] = std::abs(area(surface) - exact);
     EXPECT_LT(radius_error[i], h * h / radius);
     EXPECT_LT(area_error[i], exact * 2 * h * h / (radius * radius));
@@ -104,7 +104,7 @@ TEST(IsosurfaceTest, AnyAffineTransform) {
     const TensorField field = distance_field({Vector3i::Constant(-30), Vector3i::Constant(30)}, transform);
     const Isosurface surface = isosurface(field, Invariant::largest_eigenvalue, 0.7);
     EXPECT_EQ(open_edges(surface), 0);
-    EXPECT_LT(greatest_radius_error(surface, 0.7), 0.08 * 0.08 / 0.7);
+    EXPECT_LT(max_radius_error(surface, 0.7), 0.08 * 0.08 / 0.7);
     EXPECT_NEAR(area(surface), 4 * pi * 0.49, 4 * pi * 0.49 * 2 * 0.0064 / 0.49);
     expect_inwards(surface, 0.05);
   }
@@ -122,7 +122,7 @@ TEST(IsosurfaceTest, IsOpenAtTheFacesOfTheExtentAndEndsOnThem) {
   EXPECT_GT(open_edges(surface), 40);
   const double exact = 2 * pi * 0.6 * (0.25 - center.x() + 0.6);
   EXPECT_NEAR(area(surface), exact, exact * 0.02);
-  EXPECT_LT(greatest_radius_error(surface, 0.6), 0.5 / n);
+  EXPECT_LT(max_radius_error(surface, 0.6), 0.5 / n);
 }
 
 /// Missing voxels are zero, far from the faces of the extent: a block has a surface half a voxel outside it.

@@ -265,9 +265,9 @@ std::vector<double> open_ensight(const std::filesystem::path& path, vtkGenericEn
 
 EnSightCase ensight_case(const fs::path& path, std::optional<double> time) {
   const std::vector<Entry> entries = entries_of(path);
-  constexpr double most_steps = 1e6;
+  constexpr double max_steps = 1e6;
   for (const Entry& entry : entries)
-    if (entry.name == "number of steps" && !(std::strtod(entry.value.c_str(), nullptr) <= most_steps))
+    if (entry.name == "number of steps" && !(std::strtod(entry.value.c_str(), nullptr) <= max_steps))
       fail(path, "has more than a million steps of time; it may be damaged: copy or write it again");
   const std::map<int, TimeSet> sets = time_sets(entries);
   EnSightCase result;

@@ -71,11 +71,11 @@ std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
 /// Whether a dataset may have so many numbers: one whose chunks were never written takes no bytes of the file, and any
 /// memory. Numbers of virtual datasets are in other files.
 bool is_likely(hid_t data, hid_t type, std::uint64_t count) {
-  constexpr double unwritten = 64 << 20, most_expanded = 1e5;  // zstd makes 30,000 bytes of one.
+  constexpr double unwritten = 64 << 20, max_expansion = 1e5;  // zstd makes 30,000 bytes of one.
   const Id list(H5Dget_create_plist(data), H5Pclose);
   if (H5Pget_layout(list) == H5D_VIRTUAL || H5Pget_external_count(list) > 0) return true;
   const double bytes = static_cast<double>(H5Tget_size(type)) * static_cast<double>(count);
-  return bytes <= std::max(unwritten, most_expanded * static_cast<double>(H5Dget_storage_size(data)));
+  return bytes <= std::max(unwritten, max_expansion * static_cast<double>(H5Dget_storage_size(data)));
 }
 
 }  // namespace

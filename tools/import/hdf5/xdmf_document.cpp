@@ -49,12 +49,12 @@ std::vector<PathStep> steps_of(const std::string& xpath) {
   return steps;
 }
 
-constexpr std::size_t most_elements = 1u << 20;  // That a path or a collection may name.
+constexpr std::size_t max_elements = 1u << 20;  // That a path or a collection may name.
 
 constexpr int deepest = 16;  // Where each includes two others, there are 65,536 then.
 
 void require_few(const std::filesystem::path& path, std::size_t elements) {
-  if (elements > most_elements) fail(path, "its paths or grids name more than a million of others; write it again");
+  if (elements > max_elements) fail(path, "its paths or grids name more than a million of others; write it again");
 }
 
 void add_below(Element& element, Elements& all) {

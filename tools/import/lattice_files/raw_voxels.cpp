@@ -18,7 +18,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double greatest_expansion = 1032;   // Of zlib.
+constexpr double max_expansion = 1032;        // Of zlib.
 constexpr std::uint64_t page_size = 1 << 16;  // The largest of any system.
 
 std::ifstream open_at(const std::filesystem::path& path, std::uint64_t offset) {
@@ -140,7 +140,7 @@ std::shared_ptr<const char> read_numbers(const std::filesystem::path& path, cons
     fail(path, "its data file " + place.file.string() + " is missing");
   const double needed = size.cast<double>().prod() * components * type.bytes;
   const double held = static_cast<double>(bytes) - static_cast<double>(place.offset);
-  if (needed + static_cast<double>(place.skipped) > held * (place.is_compressed ? greatest_expansion : 1))
+  if (needed + static_cast<double>(place.skipped) > held * (place.is_compressed ? max_expansion : 1))
     fail(path, fmt::format("announces {:.0f} bytes of numbers, and holds no more than {:.0f}: cut off, or a damaged "
                            "header",
                            needed, std::max(0.0, held - static_cast<double>(place.skipped))));

@@ -25,10 +25,10 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double flatness = 1e-6;  // Of the mesh's diagonal.
-constexpr double most_squares = 1 << 21;
+constexpr double max_squares = 1 << 21;
 
 /// Whether only cells of one, two or three dimensions are in a mesh: the greatest dimension.
-int greatest_dimension(vtkDataSet& mesh, vtkGenericCell& cell) {
+int max_dimension(vtkDataSet& mesh, vtkGenericCell& cell) {
   int dimension = 0;
   for (vtkIdType id = 0; id < mesh.GetNumberOfCells() && dimension < 3; ++id) {
     mesh.GetCell(id, &cell);
@@ -131,7 +131,7 @@ void pad_vectors(vtkDataSet& mesh) {
 
 std::optional<FlatMesh> flat_mesh(vtkDataSet& mesh) {
   vtkNew<vtkGenericCell> cell;
-  if (greatest_dimension(mesh, *cell) != 2) return {};
+  if (max_dimension(mesh, *cell) != 2) return {};
   Eigen::AlignedBox3d box;
   for (vtkIdType id = 0; id < mesh.GetNumberOfCells(); ++id) {
     mesh.GetCell(id, cell);
@@ -143,7 +143,7 @@ std::optional<FlatMesh> flat_mesh(vtkDataSet& mesh) {
   flat.axis = axis_across(box);
   Vector3d sizes = box.sizes();
   sizes[flat.axis] = 1;
-  flat.edge = std::max(typical_edge(mesh, *cell, flat.axis), std::sqrt(sizes.prod() / most_squares));
+  flat.edge = std::max(typical_edge(mesh, *cell, flat.axis), std::sqrt(sizes.prod() / max_squares));
   return flat;
 }
 

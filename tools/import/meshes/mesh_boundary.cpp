@@ -181,7 +181,7 @@ TriangleMesh body_surface(vtkDataSet& mesh) {
   const Points points = points_of(mesh);
   const std::vector<Face> faces = outer_faces(mesh, points);
   const Eigen::Matrix3Xd extreme = extreme_points(mesh, faces, points);
-  const double least_depth = 1e-3 * (extreme.rowwise().maxCoeff() - extreme.rowwise().minCoeff()).norm();
+  const double min_depth = 1e-3 * (extreme.rowwise().maxCoeff() - extreme.rowwise().minCoeff()).norm();
   TriangleMesh surface;
   std::map<vtkIdType, std::uint32_t> vertex_of_point;
   MeshCell cell;
@@ -189,7 +189,7 @@ TriangleMesh body_surface(vtkDataSet& mesh) {
     cell.load(mesh, face.cell);
     const FacePlane plane = plane_of(cell, face.index, points);
     const double depth = plane.outmost - (plane.normal.transpose() * extreme).minCoeff();
-    if (!(depth > least_depth)) continue;
+    if (!(depth > min_depth)) continue;
     for (const auto& triangle : plane.triangles) {
       std::array<std::uint32_t, 3> vertices{};
       for (std::size_t k = 0; k < 3; ++k) {

@@ -35,7 +35,7 @@ namespace {
 /// The fraction of the peak that sampling must keep; below it a warning is printed.
 constexpr double kept_peak = 0.95;
 /// The greatest part of voxels with a negative eigenvalue that is no reason for a warning: noise makes some.
-constexpr double most_negative = 0.2;
+constexpr double max_negative = 0.2;
 
 struct ImportOptions {
   ImportSettings settings;
@@ -89,7 +89,7 @@ void print_lattice(const LatticeReport& report) {
   tell_made(fmt::format("  voxels as they were: {} of {} active ({:.1f}%); {} background, {} not finite", report.active,
                         report.voxels, percent(report.active), report.background, report.non_finite));
   for (const std::string& note : report.notes) tell_made(fmt::format("  {}", note));
-  if (report.negative > most_negative)
+  if (report.negative > max_negative)
     tell({fmt::format(
              "tensorray: warning: {:.0f}% of the voxels have a negative eigenvalue; if the field is a diffusion "
              "tensor, --order is wrong",

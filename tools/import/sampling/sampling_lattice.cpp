@@ -22,8 +22,8 @@ using Eigen::Vector3i;
 using CellRange = tbb::blocked_range<vtkIdType>;
 
 constexpr double rounded_one = 1 + 1e-9;
-constexpr double most_voxels = 1 << 30;         ///< Limit for any lattice.
-constexpr double most_chosen_voxels = 1 << 21;  ///< Limit for a lattice whose size the user did not set.
+constexpr double max_voxels = 1 << 30;         ///< Limit for any lattice.
+constexpr double max_chosen_voxels = 1 << 21;  ///< Limit for a lattice whose size the user did not set.
 
 std::string text_of(const Vector3d& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
 
@@ -55,7 +55,7 @@ Vector3d voxels_along(const Vector3d& edges, double voxel) {
 bool is_small(const Vector3d& voxels) {
   constexpr double block = 8;
   const double stored = (block * (voxels / block).array().ceil()).prod();
-  return voxels.prod() <= most_chosen_voxels && stored <= 8 * most_chosen_voxels;
+  return voxels.prod() <= max_chosen_voxels && stored <= 8 * max_chosen_voxels;
 }
 
 double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& box) {
@@ -114,7 +114,7 @@ SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const Sam
     lattice.voxel.setConstant(voxel);
   }
   if (const int flat = settings.flat_axis; flat >= 0) size[flat] = 1, lattice.voxel[flat] = box.sizes()[flat];
-  if (size.prod() > most_voxels)
+  if (size.prod() > max_voxels)
     throw std::invalid_argument(
         fmt::format("a grid of {:.0f} x {:.0f} x {:.0f} voxels is beyond the limit of 2^30: give "
                     "a larger --voxel-size or a lower --resolution",

@@ -67,7 +67,7 @@ void check_rectilinear(const Path& path, vtkRectilinearGrid& grid) {
 
 /// The least number of points of a cell of each type. New cells of a type with a fixed number already have that
 /// number.
-std::array<vtkIdType, 256> least_points() {
+std::array<vtkIdType, 256> min_points() {
   std::array<vtkIdType, 256> counts{};
   for (int type = 0; type <= VTK_POLYHEDRON; ++type) {
     vtkSmartPointer<vtkCell> cell;
@@ -163,7 +163,7 @@ void check_order(const Path& path, vtkUnstructuredGrid& grid, vtkIdType id, vtkI
 
 /// VTK does not check the point indices of cells.
 void check_cells(const Path& path, vtkUnstructuredGrid& grid) {
-  static const std::array<vtkIdType, 256> least = least_points();
+  static const std::array<vtkIdType, 256> least = min_points();
   vtkDataArray& offsets = *grid.GetCells()->GetOffsetsArray();
   vtkDataArray& ids = *grid.GetCells()->GetConnectivityArray();
   const vtkUnsignedCharArray* const types = grid.GetCellTypesArray();

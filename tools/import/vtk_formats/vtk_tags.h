@@ -30,7 +30,7 @@ inline std::string attribute(const std::string& text, const std::string& name) {
 
 /// What reading a file may take at most, bytes: a small one may announce any number of points. (LZMA makes 7000 bytes
 /// of one; threads have stacks.)
-inline double most_memory_of(const std::filesystem::path& path) {
+inline double max_memory_of(const std::filesystem::path& path) {
   return 0x1p30 + 8000.0 * static_cast<double>(std::filesystem::file_size(path));
 }
 

@@ -142,7 +142,7 @@ PolyLines read_vtp_file(const Path& path, const std::set<std::string>& asked) {
   for (const std::string& name : asked)
     if (const auto found = tags.arrays.find(name); found != tags.arrays.end() && found->second >= tags.pieces)
       wanted.insert(name);
-  const ExtraMemoryLimit limit(most_memory_of(path));
+  const ExtraMemoryLimit limit(max_memory_of(path));
   const VtkMessages messages;
   try {
     vtkNew<vtkXMLPolyDataReader> reader;

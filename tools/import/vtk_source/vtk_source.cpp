@@ -44,7 +44,7 @@ DataSets read_data_sets(const MeshFormat& format, const Path& path, const VtkMes
   const int chosen = chosen_step(format, path, step);
   if (format.read) {
     std::optional<ExtraMemoryLimit> limit;
-    if (!format.has_other_files) limit.emplace(most_memory_of(path));
+    if (!format.has_other_files) limit.emplace(max_memory_of(path));
     sets = data_sets_in(format.read(path, chosen));
     messages.throw_error(path);
     for (vtkDataSet* const set : sets) {

@@ -12,7 +12,7 @@ namespace {
 using Response = http::response<http::string_body>;
 
 constexpr auto patience = std::chrono::seconds(10);  // For a request, and for its answer.
-constexpr std::uint32_t most_header_bytes = 8192;
+constexpr std::uint32_t max_header_bytes = 8192;
 
 Response make_response(http::status status, const char* type, std::string bytes) {
   Response response(status, 11);
@@ -69,7 +69,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
       : state_(std::move(state)), counted_(state_->connections), stream_(std::move(socket)) {}
 
   void read() {
-    parser_.header_limit(most_header_bytes);
+    parser_.header_limit(max_header_bytes);
     stream_.expires_after(patience);
     http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](beast::error_code error, std::size_t) {
       if (!error) self->handle();
@@ -91,7 +91,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
       return write(refusal(http::status::forbidden, "a page of another site may not come here"));
     if (state_->path_of(request) != "socket")
       return write(refusal(http::status::not_found, "nothing is here; use the address that the program printed"));
-    if (state_->sockets >= Server::most_pages)
+    if (state_->sockets >= Server::max_pages)
       return write(refusal(http::status::service_unavailable, "too many pages are open; close one"));
     stream_.expires_never();  // The socket has its own limits of time.
     open_page_socket(state_, std::move(stream_), request);
@@ -109,7 +109,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::shared_ptr<Server::State> state_;
   Counted counted_;
   beast::tcp_stream stream_;
-  beast::flat_buffer buffer_{2 * most_header_bytes};
+  beast::flat_buffer buffer_{2 * max_header_bytes};
   http::request_parser<http::empty_body> parser_;
   Response response_;
 };

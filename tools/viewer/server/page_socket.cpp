@@ -27,7 +27,7 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
     limits.keep_alive_pings = true;  // A page that is gone is noticed.
     limits.idle_timeout = std::chrono::seconds(60);
     socket_.set_option(limits);
-    socket_.read_message_max(Server::most_message_bytes);
+    socket_.read_message_max(Server::max_message_bytes);
     socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
       if (error) return;
       self->page_ = self->state_->pages.open(self->sender());
@@ -73,7 +73,7 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
   bool waits_for_too_much() const {
     std::size_t largest = 0;
     for (const PageMessage& message : queue_) largest = std::max(largest, message.data.size());
-    return waiting_bytes_ - largest > state_->settings.most_waiting_bytes;
+    return waiting_bytes_ - largest > state_->settings.max_waiting_bytes;
   }
 
   void write() {

@@ -43,7 +43,7 @@ void accept_next(const std::shared_ptr<Server::State>& state) {
   state->acceptor->async_accept([state](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
     if (error) return accept_later(state);
-    if (state->connections < Server::most_connections) serve_connection(state, std::move(socket));
+    if (state->connections < Server::max_connections) serve_connection(state, std::move(socket));
     accept_next(state);
   });
 }

@@ -22,7 +22,7 @@ struct ServerSettings {
   std::vector<std::string> hosts;     ///< Names by which browsers may call the server, beside address and "localhost".
   std::filesystem::path page;         ///< The folder of index.html, view.js and view.css.
   /// A page that still has more than this to read, beside its largest message, when another comes is closed.
-  std::size_t most_waiting_bytes = 64 << 20;
+  std::size_t max_waiting_bytes = 64 << 20;
 };
 
 /// Answers only requests whose path begins with the token, whose `Host` is one of the server's, and, for a WebSocket,
@@ -33,8 +33,8 @@ class Server {
  public:
   struct State;
 
-  static constexpr std::size_t most_connections = 64, most_pages = 8;
-  static constexpr std::size_t most_message_bytes = 1 << 20;
+  static constexpr std::size_t max_connections = 64, max_pages = 8;
+  static constexpr std::size_t max_message_bytes = 1 << 20;
 
   /// Listens. @throw std::runtime_error if the address or port cannot be had, or the page is not built;
   /// std::invalid_argument if the address is none.

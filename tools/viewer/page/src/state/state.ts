@@ -5,7 +5,7 @@ import type { Json, JsonObject, Path } from "./json";
 
 /** Repeated key presses on one control within this time are one step; ms. */
 const repeat_time = 600;
-const most_steps = 500;
+const max_steps = 500;
 
 export class State {
   original: JsonObject = {};
@@ -53,7 +53,7 @@ export class State {
     const continues = same && (this.gesture_open || now - this.last_change < repeat_time);
     if (!continues) {
       this.past.push(this.scene);
-      if (this.past.length > most_steps) this.past.shift();
+      if (this.past.length > max_steps) this.past.shift();
     }
     this.future = [];
     this.gesture = gesture;
