@@ -479,6 +479,10 @@ TEST(PacketKernel, InstructionSetsAgree) {
     const RayBatch best = traced(scene, scene.rays);
     for (const std::string& name : packets::instruction_sets()) {
       packets::use_instruction_set(name);
+      if (name == "SSE2") {  // It has no fused multiply-adds: other roundings decide about steps.
+        expect_as_exact_as_reference(scene);
+        continue;
+      }
       const RayBatch other = traced(scene, scene.rays);
       for (std::size_t i = 0; i < other.size(); ++i)
         EXPECT_TRUE(!agree(moved, exact, i) || agree(other, best, i)) << name << ", ray " << i;
