@@ -70,7 +70,7 @@ void describe(BendingDescription& bending, Visitor& visit) {
   visit("rgb", bending.rgb, "three flexibilities, one for each colour channel, instead of wavelengths");
   visit("method", bending.settings.method,
         "how rays are integrated; auto is splitting4 between cubic voxels, splitting between linear ones; all but "
-        "splitting4 between cubic voxels are about ten times slower");
+        "splitting4 between cubic voxels are five to six times slower");
   visit("step", bending.settings.step,
         "arc length per step, in voxels; auto follows the error, or the strength of the field",
         above(0).or_word("auto"));

@@ -51,7 +51,7 @@ struct BendingSettings {
 };
 
 /// The settings with the method that `automatic` is for a field. Only `splitting4`, and `splitting` with a given step,
-/// are traced in packets, in cubic fields; all else is about ten times slower.
+/// are traced in packets, in cubic fields; all else is five to six times slower.
 BendingSettings resolved(BendingSettings settings, const TensorField& field);
 
 /// Why a ray ended. The counts are part of every render's statistics.
