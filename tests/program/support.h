@@ -95,6 +95,24 @@ class Program : public ::testing::Test {
     return outcome;
   }
 
+  /// An error of a user: one line on standard error that has `text`. @param status  0: any but success.
+  static void expect_one_line(const Outcome& outcome, const std::string& text, int status = 0) {
+    EXPECT_TRUE(status == 0 ? outcome.status != 0 : outcome.status == status) << outcome.status << outcome.error;
+    EXPECT_NE(outcome.error.find(text), std::string::npos) << outcome.error << "\nexpected " << text;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  }
+
+  /// Runs the program, which must end so.
+  void expect_error(const std::string& text, const std::vector<std::string>& arguments, int status = 0) const {
+    expect_one_line(run(arguments), text, status);
+  }
+
+  bool has(const std::string& name) const { return std::filesystem::exists(in_folder(name)); }
+
+  bool is_equal(const std::string& a, const std::string& b) const {
+    return has(a) && has(b) && read_file(in_folder(a)) == read_file(in_folder(b));
+  }
+
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(in_folder(name), std::ios::binary) << text;
   }

@@ -79,23 +79,10 @@ class KeptWork : public Program {
     }
   }
 
-  bool is_equal(const std::string& a, const std::string& b) const {
-    return has(a) && has(b) && read_file(in_folder(a)) == read_file(in_folder(b));
-  }
-
   void expect_same(const std::string& name) const {
     for (const char* ending : {".png", ".exr"})
       EXPECT_TRUE(is_equal(name + ending, "whole" + std::string(ending))) << ending;
   }
-
-  void expect_error(const std::string& part, const std::vector<std::string>& arguments, int status = 2) const {
-    const Outcome outcome = run(arguments);
-    EXPECT_EQ(outcome.status, status) << part;
-    EXPECT_NE(outcome.error.find(part), std::string::npos) << outcome.error;
-    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
-  }
-
-  bool has(const std::string& name) const { return std::filesystem::exists(in_folder(name)); }
 
   void make_shards(int count) const {
     for (int i = 1; i <= count; ++i)
