@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <map>
 #include <memory>
@@ -12,10 +11,11 @@
 
 #include "base/errors.h"
 #include "base/files/output_file.h"
+#include "base/process/archive.h"
 #include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
-#include "python/module/choices.h"
-#include "python/module/field.h"
+#include "python/module/module.h"
+#include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/invariants.h"
@@ -127,44 +127,43 @@ py::tuple tensors_of(const Field& field) {
   return py::make_tuple(tensors, rows_first(to_world.matrix()), grid.name, grid.metadata);
 }
 
-/// All that a grid holds, for another process: name, transform, metadata; and of its blocks the origins, the active
-/// voxels, and the tensors, as their memory is.
-py::tuple voxels_of(const Field& field) {
-  TensorGrid grid;
-  run([&](const Progress&) { grid = field.grid(); }, py::none(), 0);
-  std::vector<int> origins;
-  std::vector<std::uint8_t> active;
-  std::vector<float> values;
-  for (const TensorBlock& block : grid.blocks) {
-    origins.insert(origins.end(), block.origin.data(), block.origin.data() + 3);
-    for (std::size_t i = 0; i < TensorBlock::voxels; ++i) active.push_back(block.active[i] ? 1 : 0);
-    const float* const first = block.values.front().data();
-    values.insert(values.end(), first, first + block_floats);
+/// All that a grid holds, to or from the bytes that another process gets.
+void copy_grid(TensorGrid& grid, Archive& archive) {
+  std::string metadata = Json(grid.metadata).dump();
+  std::size_t count = grid.blocks.size();
+  archive.copy_list(grid.name);
+  archive.copy(grid.to_world.data(), sizeof grid.to_world.matrix());
+  archive.copy_list(metadata);
+  archive.copy(count);
+  if (archive.reads()) {
+    grid.metadata = parse_value(metadata).get<std::map<std::string, std::string>>();
+    archive.require(count, block_floats * sizeof(float));
+    grid.blocks = make_blocks(count);
   }
-  const auto count = static_cast<py::ssize_t>(grid.blocks.size());
-  return py::make_tuple(grid.name, rows_first(grid.to_world.matrix()), grid.metadata,
-                        taken(std::move(origins), {count, 3}), taken(std::move(active), {count, TensorBlock::voxels}),
-                        taken(std::move(values), {count, block_floats}));
+  for (TensorBlock& block : grid.blocks) {
+    archive.copy(block.origin.data(), sizeof block.origin);
+    archive.copy(block.active);
+    archive.copy(block.values.front().data(), block_floats * sizeof(float));
+  }
+}
+
+py::bytes voxels_of(const Field& field) {
+  Archive archive;
+  run(
+      [&](const Progress&) {
+        TensorGrid grid = field.grid();
+        copy_grid(grid, archive);
+      },
+      py::none(), 0);
+  return archive.take();
 }
 
 /// @param voxels  Of `voxels_of`.
-std::shared_ptr<Field> field_of_voxels(const std::string& keys, const py::tuple& voxels) {
+std::shared_ptr<Field> field_of_voxels(const std::string& keys, const std::string& voxels) {
   TensorGrid grid;
-  grid.name = voxels[0].cast<std::string>();
-  grid.to_world.matrix() =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(voxels[1].cast<Doubles>().data());
-  grid.metadata = voxels[2].cast<std::map<std::string, std::string>>();
-  const auto origins = voxels[3].cast<py::array_t<int, py::array::c_style>>();
-  const auto active = voxels[4].cast<py::array_t<std::uint8_t, py::array::c_style>>();
-  const auto values = voxels[5].cast<py::array_t<float, py::array::c_style>>();
-  grid.blocks = make_blocks(static_cast<std::size_t>(origins.shape(0)));
-  for (py::ssize_t i = 0; i < origins.shape(0); ++i) {
-    TensorBlock& block = grid.blocks[static_cast<std::size_t>(i)];
-    block.origin = Eigen::Map<const Eigen::Vector3i>(origins.data(i, 0));
-    for (py::ssize_t voxel = 0; voxel < TensorBlock::voxels; ++voxel)
-      block.active[static_cast<std::size_t>(voxel)] = active.at(i, voxel) != 0;
-    std::copy_n(values.data(i, 0), block_floats, block.values.front().data());
-  }
+  Archive archive(voxels);
+  copy_grid(grid, archive);
+  archive.finish();
   return std::make_shared<Field>(parse_value(keys), source_of(std::move(grid)));
 }
 

@@ -1,5 +1,3 @@
-#include "python/module/renders.h"
-
 #include <algorithm>
 #include <map>
 #include <memory>
@@ -14,6 +12,7 @@
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
+#include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "scenes/jobs/origin.h"

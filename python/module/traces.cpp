@@ -1,5 +1,3 @@
-#include "python/module/traces.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -16,8 +14,7 @@
 
 #include "base/errors.h"
 #include "python/module/arrays.h"
-#include "python/module/choices.h"
-#include "python/module/field.h"
+#include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "renderer/meshes/mesh.h"

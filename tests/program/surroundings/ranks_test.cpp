@@ -63,9 +63,7 @@ class RanksProgram : public Program {
 
   std::string error() const { return read_file(in_folder("error")); }
 
-  void expect_same(const std::string& a, const std::string& b) const {
-    EXPECT_TRUE(is_equal(a, b)) << a << ", " << b;
-  }
+  void expect_same(const std::string& a, const std::string& b) const { EXPECT_TRUE(is_equal(a, b)) << a << ", " << b; }
 
   /// The process that is a rank of mpirun's process; none if it has not begun.
   static std::optional<pid_t> process_of(pid_t parent, int rank) {
