@@ -40,7 +40,8 @@ constexpr int block_floats = 9 * TensorBlock::voxels;
 /// A field of an array (nz, ny, nx, 3, 3) of floats or doubles with any strides. The array is not copied: the field
 /// keeps it, and reads it when its bricks are made.
 template <class Number>
-std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, const Doubles& to_world, Json keys) {
+std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, const Doubles& to_world,
+                                      const std::string& text) {
   require(tensors.ndim() == 5 && tensors.shape(3) == 3 && tensors.shape(4) == 3,
           "the tensors must be an array of shape (nz, ny, nx, 3, 3)");
   require(tensors.size() > 0, "the array of tensors is empty");
@@ -65,6 +66,7 @@ std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, con
     return result;
   };
   BlockSource blocks = dense_source({Eigen::Vector3i::Zero(), size - Eigen::Vector3i::Ones()}, transform, tensor);
+  Json keys = parse_value(text);
   blocks.name = keys.value("name", blocks.name);
   return std::make_shared<Field>(std::move(keys), std::move(blocks), tensors);
 }
@@ -72,12 +74,10 @@ std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, con
 std::shared_ptr<Field> read_field(const std::filesystem::path& file, const std::string& keys, const std::string& name,
                                   const std::string& derive, const py::object& report) {
   TensorGrid grid;
-  run(
-      [&](const Progress& progress) {
-        progress.update("reading", 0, 1);
-        grid = read_tensor_vdb(file, name, value_of<Derive>("derive", derive));
-      },
-      report, 0);
+  run(report, 0, [&](const Progress& progress) {
+    progress.update("reading", 0, 1);
+    grid = read_tensor_vdb(file, name, value_of<Derive>("derive", derive));
+  });
   return std::make_shared<Field>(parse_value(keys), source_of(std::move(grid)));
 }
 
@@ -87,12 +87,10 @@ std::shared_ptr<Field> make_field(const std::string& generator, const py::object
   const SceneDescription description =
       read_scene_json({{"field", keys}, {"integrator", {{"type", "photon_distribution"}}}}, "make");
   TensorGrid grid;
-  run(
-      [&](const Progress& progress) {
-        progress.update("making", 0, 1);
-        grid = generate(description.field.generate->generator, description.field.generate->grid);
-      },
-      report, 0);
+  run(report, 0, [&](const Progress& progress) {
+    progress.update("making", 0, 1);
+    grid = generate(description.field.generate->generator, description.field.generate->grid);
+  });
   return std::make_shared<Field>(std::move(keys), source_of(std::move(grid)));
 }
 
@@ -118,7 +116,7 @@ py::array dense_array(const Blocks& blocks, const Eigen::AlignedBox3i& box, Shap
 /// The tensors over the box of the active voxels, and the transform of its indices (x, y, z) to the world.
 py::tuple tensors_of(const Field& field) {
   TensorGrid grid;
-  run([&](const Progress&) { grid = field.grid(); }, py::none(), 0);
+  run(py::none(), 0, [&](const Progress&) { grid = field.grid(); });
   const Eigen::AlignedBox3i box = grid.active_box();
   const Eigen::Affine3d to_world = grid.to_world * Eigen::Translation3d(box.min().cast<double>());
   const py::array tensors = dense_array(grid.blocks, box, {3, 3}, 0, [](const Eigen::Matrix3f& tensor, float* to) {
@@ -149,12 +147,10 @@ void copy_grid(TensorGrid& grid, Archive& archive) {
 
 py::bytes voxels_of(const Field& field) {
   Archive archive;
-  run(
-      [&](const Progress&) {
-        TensorGrid grid = field.grid();
-        copy_grid(grid, archive);
-      },
-      py::none(), 0);
+  run(py::none(), 0, [&](const Progress&) {
+    TensorGrid grid = field.grid();
+    copy_grid(grid, archive);
+  });
   return archive.take();
 }
 
@@ -171,46 +167,36 @@ py::array invariant_of_field(const Field& field, const std::string& name, const 
   const Invariant which = invariant_of(name);
   ScalarGrid invariant;
   Eigen::AlignedBox3i box;
-  run(
-      [&](const Progress& progress) {
-        progress.update("deriving", 0, 1);
-        TensorGrid grid = field.grid();
-        box = grid.active_box();
-        remove_non_finite(grid);
-        invariant = invariant_grid(which, grid);
-      },
-      report, 0);
+  run(report, 0, [&](const Progress& progress) {
+    progress.update("deriving", 0, 1);
+    TensorGrid grid = field.grid();
+    box = grid.active_box();
+    remove_non_finite(grid);
+    invariant = invariant_grid(which, grid);
+  });
   const float none = std::numeric_limits<float>::quiet_NaN();
   return dense_array(invariant.blocks, box, {}, none, [](float value, float* to) { *to = value; });
 }
 
 void write_field(const Field& field, const std::filesystem::path& path, bool half, const py::object& report) {
   require(path.extension() == ".vdb", path.string() + " must end in .vdb");
-  run(
-      [&](const Progress& progress) {
-        progress.update("writing", 0, 1);
-        OutputFile file(path);
-        TensorGrid grid = field.grid();
-        if (remove_non_finite(grid) > 0 && grid.blocks.empty())
-          throw std::runtime_error(path.string() + ": no voxel of the field is finite");
-        file.write([&](const std::filesystem::path& temporary) { write_tensor_vdb(temporary, grid, half); });
-        file.commit();
-      },
-      report, 0);
+  run(report, 0, [&](const Progress& progress) {
+    progress.update("writing", 0, 1);
+    OutputFile file(path);
+    TensorGrid grid = field.grid();
+    if (remove_non_finite(grid) > 0 && grid.blocks.empty())
+      throw std::runtime_error(path.string() + ": no voxel of the field is finite");
+    file.write([&](const std::filesystem::path& temporary) { write_tensor_vdb(temporary, grid, half); });
+    file.commit();
+  });
 }
 
 }  // namespace
 
 void add_fields(py::module_& module) {
   py::class_<Field, std::shared_ptr<Field>>(module, "Field");
-  module.def("field_of_floats",
-             [](const py::array_t<float, 0>& tensors, const Doubles& to_world, const std::string& keys) {
-               return field_of_array<float>(tensors, to_world, parse_value(keys));
-             });
-  module.def("field_of_doubles",
-             [](const py::array_t<double, 0>& tensors, const Doubles& to_world, const std::string& keys) {
-               return field_of_array<double>(tensors, to_world, parse_value(keys));
-             });
+  module.def("field_of_floats", &field_of_array<float>);
+  module.def("field_of_doubles", &field_of_array<double>);
   module.def("read_field", &read_field);
   module.def("make_field", &make_field);
   module.def("write_field", &write_field);

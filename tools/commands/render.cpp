@@ -14,7 +14,6 @@
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
 #include "tools/ranks/ranks.h"
-#include "tools/rendering/frames.h"
 #include "tools/rendering/render_scene.h"
 
 namespace tensorray {

@@ -18,7 +18,7 @@ class Explore : public Program {
  protected:
   void SetUp() override {
     Program::SetUp();
-    run_well({"make", "point_load", "-o", "stress.vdb", "--resolution", "17"});
+    run_well({"make", "point_load", "-o", "stress.vdb", "--resolution", "9"});
   }
 
   const std::vector<std::string> few_{"--set", "light.wavelengths.count=4", "-q"};
