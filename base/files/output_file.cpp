@@ -135,6 +135,12 @@ void OutputFile::rethrow_for_target(std::string message) const {
   throw std::runtime_error(message);
 }
 
+void OutputFile::write_text(const std::string& text) {
+  Descriptor file = open_file(temporary_, O_WRONLY | O_TRUNC);
+  if (!file.is_open() || !write_whole(file.get(), text) || !file.close())
+    fail(target_, fmt::format("cannot be written: {}", std::strerror(errno)));
+}
+
 void OutputFile::copy_into_device() {
   if (is_device_) copy_into(temporary_, resolved_);
 }

@@ -3,6 +3,7 @@
 /// Output files that are either complete or absent.
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace tensorray {
@@ -39,6 +40,9 @@ class OutputFile {
       rethrow_for_target(error.what());
     }
   }
+
+  /// Makes the file of this text. @throw std::runtime_error naming the target: the disk may be full.
+  void write_text(const std::string& text);
 
   /// Does what commit_all does, for this file alone.
   void commit();

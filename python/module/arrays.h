@@ -31,13 +31,14 @@ py::array view(const T* data, const Shape& shape, const py::object& owner, const
   return array;
 }
 
-/// An array that takes over a vector of values.
-template <class T>
-py::array taken(std::vector<T> values, const Shape& shape) {
-  auto owned = std::make_unique<std::vector<T>>(std::move(values));
-  const T* const data = owned->data();
-  const py::capsule owner(owned.release(), [](void* vector) { delete static_cast<std::vector<T>*>(vector); });
-  return py::array(py::dtype::of<T>(), shape, data, owner);
+/// An array that takes over a vector of values: numbers, or structs of nothing but `Number`s.
+template <class Value, class Number = Value>
+py::array taken(std::vector<Value> values, const Shape& shape) {
+  static_assert(sizeof(Value) % sizeof(Number) == 0, "no padding");
+  auto owned = std::make_unique<std::vector<Value>>(std::move(values));
+  const auto* const data = reinterpret_cast<const Number*>(owned->data());
+  const py::capsule owner(owned.release(), [](void* vector) { delete static_cast<std::vector<Value>*>(vector); });
+  return py::array(py::dtype::of<Number>(), shape, data, owner);
 }
 
 /// The same for vectors of fixed-size Eigen matrices, whose numbers become further axes: `shape` has them, with the
@@ -46,10 +47,7 @@ template <class Matrix>
 py::array taken_matrices(std::vector<Matrix> values, const Shape& shape) {
   using Number = typename Matrix::Scalar;
   static_assert(sizeof(Matrix) == sizeof(Number) * Matrix::SizeAtCompileTime, "no padding");
-  auto owned = std::make_unique<std::vector<Matrix>>(std::move(values));
-  const auto* const data = reinterpret_cast<const Number*>(owned->data());
-  const py::capsule owner(owned.release(), [](void* vector) { delete static_cast<std::vector<Matrix>*>(vector); });
-  return py::array(py::dtype::of<Number>(), shape, data, owner);
+  return taken<Matrix, Number>(std::move(values), shape);
 }
 
 /// @throw std::invalid_argument unless there are three numbers.

@@ -40,7 +40,4 @@ class Field {
   mutable std::optional<LoadedField> loaded_;
 };
 
-/// Adds Field and its functions to the module.
-void add_fields(pybind11::module_& module);
-
 }  // namespace tensorray

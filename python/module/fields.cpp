@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <map>
 #include <memory>
@@ -12,10 +11,11 @@
 
 #include "base/errors.h"
 #include "base/files/output_file.h"
+#include "base/process/archive.h"
 #include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
-#include "python/module/choices.h"
-#include "python/module/field.h"
+#include "python/module/module.h"
+#include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/invariants.h"
@@ -40,7 +40,8 @@ constexpr int block_floats = 9 * TensorBlock::voxels;
 /// A field of an array (nz, ny, nx, 3, 3) of floats or doubles with any strides. The array is not copied: the field
 /// keeps it, and reads it when its bricks are made.
 template <class Number>
-std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, const Doubles& to_world, Json keys) {
+std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, const Doubles& to_world,
+                                      const std::string& text) {
   require(tensors.ndim() == 5 && tensors.shape(3) == 3 && tensors.shape(4) == 3,
           "the tensors must be an array of shape (nz, ny, nx, 3, 3)");
   require(tensors.size() > 0, "the array of tensors is empty");
@@ -65,6 +66,7 @@ std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, con
     return result;
   };
   BlockSource blocks = dense_source({Eigen::Vector3i::Zero(), size - Eigen::Vector3i::Ones()}, transform, tensor);
+  Json keys = parse_value(text);
   blocks.name = keys.value("name", blocks.name);
   return std::make_shared<Field>(std::move(keys), std::move(blocks), tensors);
 }
@@ -72,12 +74,10 @@ std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, con
 std::shared_ptr<Field> read_field(const std::filesystem::path& file, const std::string& keys, const std::string& name,
                                   const std::string& derive, const py::object& report) {
   TensorGrid grid;
-  run(
-      [&](const Progress& progress) {
-        progress.update("reading", 0, 1);
-        grid = read_tensor_vdb(file, name, value_of<Derive>("derive", derive));
-      },
-      report, 0);
+  run(report, 0, [&](const Progress& progress) {
+    progress.update("reading", 0, 1);
+    grid = read_tensor_vdb(file, name, value_of<Derive>("derive", derive));
+  });
   return std::make_shared<Field>(parse_value(keys), source_of(std::move(grid)));
 }
 
@@ -87,12 +87,10 @@ std::shared_ptr<Field> make_field(const std::string& generator, const py::object
   const SceneDescription description =
       read_scene_json({{"field", keys}, {"integrator", {{"type", "photon_distribution"}}}}, "make");
   TensorGrid grid;
-  run(
-      [&](const Progress& progress) {
-        progress.update("making", 0, 1);
-        grid = generate(description.field.generate->generator, description.field.generate->grid);
-      },
-      report, 0);
+  run(report, 0, [&](const Progress& progress) {
+    progress.update("making", 0, 1);
+    grid = generate(description.field.generate->generator, description.field.generate->grid);
+  });
   return std::make_shared<Field>(std::move(keys), source_of(std::move(grid)));
 }
 
@@ -118,7 +116,7 @@ py::array dense_array(const Blocks& blocks, const Eigen::AlignedBox3i& box, Shap
 /// The tensors over the box of the active voxels, and the transform of its indices (x, y, z) to the world.
 py::tuple tensors_of(const Field& field) {
   TensorGrid grid;
-  run([&](const Progress&) { grid = field.grid(); }, py::none(), 0);
+  run(py::none(), 0, [&](const Progress&) { grid = field.grid(); });
   const Eigen::AlignedBox3i box = grid.active_box();
   const Eigen::Affine3d to_world = grid.to_world * Eigen::Translation3d(box.min().cast<double>());
   const py::array tensors = dense_array(grid.blocks, box, {3, 3}, 0, [](const Eigen::Matrix3f& tensor, float* to) {
@@ -127,44 +125,41 @@ py::tuple tensors_of(const Field& field) {
   return py::make_tuple(tensors, rows_first(to_world.matrix()), grid.name, grid.metadata);
 }
 
-/// All that a grid holds, for another process: name, transform, metadata; and of its blocks the origins, the active
-/// voxels, and the tensors, as their memory is.
-py::tuple voxels_of(const Field& field) {
-  TensorGrid grid;
-  run([&](const Progress&) { grid = field.grid(); }, py::none(), 0);
-  std::vector<int> origins;
-  std::vector<std::uint8_t> active;
-  std::vector<float> values;
-  for (const TensorBlock& block : grid.blocks) {
-    origins.insert(origins.end(), block.origin.data(), block.origin.data() + 3);
-    for (std::size_t i = 0; i < TensorBlock::voxels; ++i) active.push_back(block.active[i] ? 1 : 0);
-    const float* const first = block.values.front().data();
-    values.insert(values.end(), first, first + block_floats);
+/// All that a grid holds, to or from the bytes that another process gets.
+void copy_grid(TensorGrid& grid, Archive& archive) {
+  std::string metadata = Json(grid.metadata).dump();
+  std::size_t count = grid.blocks.size();
+  archive.copy_list(grid.name);
+  archive.copy(grid.to_world.data(), sizeof grid.to_world.matrix());
+  archive.copy_list(metadata);
+  archive.copy(count);
+  if (archive.reads()) {
+    grid.metadata = parse_value(metadata).get<std::map<std::string, std::string>>();
+    archive.require(count, block_floats * sizeof(float));
+    grid.blocks = make_blocks(count);
   }
-  const auto count = static_cast<py::ssize_t>(grid.blocks.size());
-  return py::make_tuple(grid.name, rows_first(grid.to_world.matrix()), grid.metadata,
-                        taken(std::move(origins), {count, 3}), taken(std::move(active), {count, TensorBlock::voxels}),
-                        taken(std::move(values), {count, block_floats}));
+  for (TensorBlock& block : grid.blocks) {
+    archive.copy(block.origin.data(), sizeof block.origin);
+    archive.copy(block.active);
+    archive.copy(block.values.front().data(), block_floats * sizeof(float));
+  }
+}
+
+py::bytes voxels_of(const Field& field) {
+  Archive archive;
+  run(py::none(), 0, [&](const Progress&) {
+    TensorGrid grid = field.grid();
+    copy_grid(grid, archive);
+  });
+  return archive.take();
 }
 
 /// @param voxels  Of `voxels_of`.
-std::shared_ptr<Field> field_of_voxels(const std::string& keys, const py::tuple& voxels) {
+std::shared_ptr<Field> field_of_voxels(const std::string& keys, const std::string& voxels) {
   TensorGrid grid;
-  grid.name = voxels[0].cast<std::string>();
-  grid.to_world.matrix() =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(voxels[1].cast<Doubles>().data());
-  grid.metadata = voxels[2].cast<std::map<std::string, std::string>>();
-  const auto origins = voxels[3].cast<py::array_t<int, py::array::c_style>>();
-  const auto active = voxels[4].cast<py::array_t<std::uint8_t, py::array::c_style>>();
-  const auto values = voxels[5].cast<py::array_t<float, py::array::c_style>>();
-  grid.blocks = make_blocks(static_cast<std::size_t>(origins.shape(0)));
-  for (py::ssize_t i = 0; i < origins.shape(0); ++i) {
-    TensorBlock& block = grid.blocks[static_cast<std::size_t>(i)];
-    block.origin = Eigen::Map<const Eigen::Vector3i>(origins.data(i, 0));
-    for (py::ssize_t voxel = 0; voxel < TensorBlock::voxels; ++voxel)
-      block.active[static_cast<std::size_t>(voxel)] = active.at(i, voxel) != 0;
-    std::copy_n(values.data(i, 0), block_floats, block.values.front().data());
-  }
+  Archive archive(voxels);
+  copy_grid(grid, archive);
+  archive.finish();
   return std::make_shared<Field>(parse_value(keys), source_of(std::move(grid)));
 }
 
@@ -172,46 +167,36 @@ py::array invariant_of_field(const Field& field, const std::string& name, const 
   const Invariant which = invariant_of(name);
   ScalarGrid invariant;
   Eigen::AlignedBox3i box;
-  run(
-      [&](const Progress& progress) {
-        progress.update("deriving", 0, 1);
-        TensorGrid grid = field.grid();
-        box = grid.active_box();
-        remove_non_finite(grid);
-        invariant = invariant_grid(which, grid);
-      },
-      report, 0);
+  run(report, 0, [&](const Progress& progress) {
+    progress.update("deriving", 0, 1);
+    TensorGrid grid = field.grid();
+    box = grid.active_box();
+    remove_non_finite(grid);
+    invariant = invariant_grid(which, grid);
+  });
   const float none = std::numeric_limits<float>::quiet_NaN();
   return dense_array(invariant.blocks, box, {}, none, [](float value, float* to) { *to = value; });
 }
 
 void write_field(const Field& field, const std::filesystem::path& path, bool half, const py::object& report) {
   require(path.extension() == ".vdb", path.string() + " must end in .vdb");
-  run(
-      [&](const Progress& progress) {
-        progress.update("writing", 0, 1);
-        OutputFile file(path);
-        TensorGrid grid = field.grid();
-        if (remove_non_finite(grid) > 0 && grid.blocks.empty())
-          throw std::runtime_error(path.string() + ": no voxel of the field is finite");
-        file.write([&](const std::filesystem::path& temporary) { write_tensor_vdb(temporary, grid, half); });
-        file.commit();
-      },
-      report, 0);
+  run(report, 0, [&](const Progress& progress) {
+    progress.update("writing", 0, 1);
+    OutputFile file(path);
+    TensorGrid grid = field.grid();
+    if (remove_non_finite(grid) > 0 && grid.blocks.empty())
+      throw std::runtime_error(path.string() + ": no voxel of the field is finite");
+    file.write([&](const std::filesystem::path& temporary) { write_tensor_vdb(temporary, grid, half); });
+    file.commit();
+  });
 }
 
 }  // namespace
 
 void add_fields(py::module_& module) {
   py::class_<Field, std::shared_ptr<Field>>(module, "Field");
-  module.def("field_of_floats",
-             [](const py::array_t<float, 0>& tensors, const Doubles& to_world, const std::string& keys) {
-               return field_of_array<float>(tensors, to_world, parse_value(keys));
-             });
-  module.def("field_of_doubles",
-             [](const py::array_t<double, 0>& tensors, const Doubles& to_world, const std::string& keys) {
-               return field_of_array<double>(tensors, to_world, parse_value(keys));
-             });
+  module.def("field_of_floats", &field_of_array<float>);
+  module.def("field_of_doubles", &field_of_array<double>);
   module.def("read_field", &read_field);
   module.def("make_field", &make_field);
   module.def("write_field", &write_field);

@@ -2,6 +2,8 @@
 /// The module tensorray._tensorray. The package beside it (python/tensorray) has the functions for users; it makes
 /// their arguments plain, so that the functions here have no defaults.
 
+#include "python/module/module.h"
+
 #include <filesystem>
 #include <new>
 #include <stdexcept>
@@ -13,10 +15,6 @@
 #include "base/process/child_program.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"
-#include "python/module/field.h"
-#include "python/module/renders.h"
-#include "python/module/scene_request.h"
-#include "python/module/traces.h"
 #include "python/module/work.h"
 #include "renderer/images/image.h"
 #include "scenes/keys/scene_source.h"

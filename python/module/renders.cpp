@@ -1,5 +1,3 @@
-#include "python/module/renders.h"
-
 #include <algorithm>
 #include <map>
 #include <memory>
@@ -14,6 +12,7 @@
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
+#include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "scenes/jobs/origin.h"
@@ -85,8 +84,8 @@ std::shared_ptr<Rendered> render_request(const SceneRequest& request, const std:
 std::shared_ptr<Rendered> render_for_python(const SceneRequest& request, const std::vector<std::string>& shards,
                                             int threads, const py::object& report) {
   std::shared_ptr<Rendered> rendered;
-  run([&](const Progress& progress) { rendered = render_request(request, shards, threads, progress); }, report,
-      threads);
+  run(report, threads,
+      [&](const Progress& progress) { rendered = render_request(request, shards, threads, progress); });
   return rendered;
 }
 
@@ -118,13 +117,11 @@ void write_more(const Rendered& rendered, const std::vector<std::filesystem::pat
     if (!made.output.wants(key))
       throw std::invalid_argument(printable(path.string()) + ": the render has not kept its `" + key +
                                   "`; render with keep=[\"" + key + "\"]");
-  run(
-      [&](const Progress&) {
-        OutputFiles files = open_outputs(description.output);
-        write_outputs(rendered.render, rendered.scene, files);
-        commit_outputs(std::move(files));
-      },
-      py::none(), 0);
+  run(py::none(), 0, [&](const Progress&) {
+    OutputFiles files = open_outputs(description.output);
+    write_outputs(rendered.render, rendered.scene, files);
+    commit_outputs(std::move(files));
+  });
 }
 
 py::array pixels(const Image& image, const py::object& owner) {
@@ -190,7 +187,7 @@ void add_renders(py::module_& module) {
   module.def("check_shards", &check_shards);
   module.def("render_shard", [](const SceneRequest& request, std::size_t index, std::size_t count,
                                 const std::filesystem::path& file, int threads, const py::object& report) {
-    run([&](const Progress& progress) { render_shard(request, {index, count}, file, progress); }, report, threads);
+    run(report, threads, [&](const Progress& progress) { render_shard(request, {index, count}, file, progress); });
   });
   module.def("schema", [] { return scene_schema(); });
 }

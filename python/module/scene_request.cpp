@@ -8,6 +8,7 @@
 
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
+#include "python/module/module.h"
 #include "scenes/source/overrides.h"
 
 namespace tensorray {

@@ -1,16 +1,19 @@
 #pragma once
 /// @file python/module/scene_request.h
-/// A scene as Python asks for it.
+/// A scene as Python asks for it, and words of scene files as arguments.
 
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "python/module/field.h"
+#include "scenes/description/choices.h"
 #include "scenes/description/description.h"
+#include "scenes/keys/values.h"
 #include "scenes/scene/scene.h"
 
 namespace tensorray {
@@ -37,7 +40,13 @@ RequestedScene read_request(const SceneRequest& request);
 /// Loads it. @throw as load_scene.
 Scene load_request(const SceneRequest& request, const RequestedScene& scene, const Progress& progress);
 
-/// Adds SceneRequest to the module.
-void add_scene_request(pybind11::module_& module);
+/// The value of a word, as scene files have it. @throw std::invalid_argument that lists the words.
+template <class Enum>
+Enum value_of(const std::string& argument, const std::string& word) {
+  Enum value{};
+  if (!Value<Enum>::read(Json(word), {}, value))
+    throw std::invalid_argument(argument + " must be " + Value<Enum>::expectation(value, {}));
+  return value;
+}
 
 }  // namespace tensorray

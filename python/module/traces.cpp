@@ -1,5 +1,3 @@
-#include "python/module/traces.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -16,8 +14,7 @@
 
 #include "base/errors.h"
 #include "python/module/arrays.h"
-#include "python/module/choices.h"
-#include "python/module/field.h"
+#include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "renderer/meshes/mesh.h"
@@ -153,17 +150,15 @@ py::dict trace_for_python(const Field& field, const TraceRequest& request, int t
       request.smooth,
       value_of<Eigenvalues>("eigenvalues", request.eigenvalues),
       {value_of<Interpolation>("interpolation", request.interpolation), extends ? Border::extend : Border::fade}};
-  run(
-      [&](const Progress& progress) {
-        progress.update("loading", 0, 1);
-        const TensorField bricks = field.loaded(choices).field;
-        Surfaces surfaces;
-        surfaces.bounds = box_mesh(bricks.index_bounds(), bricks.to_world());
-        surfaces.plate = request.plate;
-        progress.update("tracing", 0, 1);
-        trace_all(bricks, Geometry(std::move(surfaces)), bending, request.paths, batches, progress);
-      },
-      report, threads);
+  run(report, threads, [&](const Progress& progress) {
+    progress.update("loading", 0, 1);
+    const TensorField bricks = field.loaded(choices).field;
+    Surfaces surfaces;
+    surfaces.bounds = box_mesh(bricks.index_bounds(), bricks.to_world());
+    surfaces.plate = request.plate;
+    progress.update("tracing", 0, 1);
+    trace_all(bricks, Geometry(std::move(surfaces)), bending, request.paths, batches, progress);
+  });
   return arrays_of(std::move(batches), request.flexibilities.size());
 }
 
@@ -225,26 +220,24 @@ py::dict landings(const SceneRequest& request, std::vector<double> flexibilities
                   const py::object& report) {
   std::optional<Scene> scene;
   FlowMap map;
-  run(
-      [&](const Progress& progress) {
-        scene.emplace(load_request(request, read_request(request), progress));
-        FlowSettings settings;
-        settings.max_starts = static_cast<std::size_t>(scene->description.light.photons);
-        settings.tolerance = tolerance;
-        const LightRange range = light_range(*scene);
-        settings.range = flexibilities.empty() && range.is_range;
-        settings.flexibilities = flexibilities.empty() ? range.flexibilities : flexibilities;
-        map = trace_flow_map(scene->field, scene->geometry, scene->beam, scene->bending, settings, progress);
-        if (settings.range) {
-          const double first = range.flexibilities.front(), last = range.flexibilities.back();
-          const double steps = map.wavelengths < 2 ? 1 : static_cast<double>(map.wavelengths - 1);
-          for (std::size_t sample = 0; sample < map.wavelengths; ++sample)
-            flexibilities.push_back(first + (last - first) * static_cast<double>(sample) / steps);
-        } else {
-          flexibilities = settings.flexibilities;
-        }
-      },
-      report, threads);
+  run(report, threads, [&](const Progress& progress) {
+    scene.emplace(load_request(request, read_request(request), progress));
+    FlowSettings settings;
+    settings.max_starts = static_cast<std::size_t>(scene->description.light.photons);
+    settings.tolerance = tolerance;
+    const LightRange range = light_range(*scene);
+    settings.range = flexibilities.empty() && range.is_range;
+    settings.flexibilities = flexibilities.empty() ? range.flexibilities : flexibilities;
+    map = trace_flow_map(scene->field, scene->geometry, scene->beam, scene->bending, settings, progress);
+    if (settings.range) {
+      const double first = range.flexibilities.front(), last = range.flexibilities.back();
+      const double steps = map.wavelengths < 2 ? 1 : static_cast<double>(map.wavelengths - 1);
+      for (std::size_t sample = 0; sample < map.wavelengths; ++sample)
+        flexibilities.push_back(first + (last - first) * static_cast<double>(sample) / steps);
+    } else {
+      flexibilities = settings.flexibilities;
+    }
+  });
   return arrays_of(std::move(map), *scene, std::move(flexibilities));
 }
 

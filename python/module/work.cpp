@@ -107,7 +107,7 @@ void look_up(Call& shared, const py::object& report) {
 
 }  // namespace
 
-void run(const std::function<void(const Progress&)>& work, const py::object& report, int threads) {
+void run(const py::object& report, int threads, const std::function<void(const Progress&)>& work) {
   if (threads < 0 || threads > 4096) throw std::invalid_argument("threads: from 1 to 4096, or 0 for all");
   Call shared;
   const Running running(shared);  // Until this thread has the GIL again.

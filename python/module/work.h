@@ -16,7 +16,7 @@ namespace tensorray {
 /// reported when it has ended without an error, however short it was.
 /// @param report   A function, or None. @param threads  Greatest number of threads that the work uses; 0: all.
 /// @throw whatever `work` throws. It must not touch Python's objects.
-void run(const std::function<void(const Progress&)>& work, const pybind11::object& report, int threads);
+void run(const pybind11::object& report, int threads, const std::function<void(const Progress&)>& work);
 
 /// Cancels the work of all threads, and waits a few seconds for its end. `run` then throws SystemExit to all threads
 /// but this one, also where it is called later. Python calls it at its exit: a thread (a daemon) that asks for the GIL

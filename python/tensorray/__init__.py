@@ -25,14 +25,15 @@ RuntimeError for work that failed. docs/python.md has examples.
 import json as _json
 import typing as _typing
 
-from . import _programs, _tensorray
-from ._fields import Field, import_file, invariant, make, read_vdb
+from . import _tensorray
+from ._fields import Field, import_file, invariant, make, programs as _programs, read_vdb
 from ._render import Render, render
 from ._tensorray import SceneError
 from ._trace import Landings, Plate, Trace, landings, trace
 
 __version__: str = _tensorray.version
 SceneError.__module__ = __name__
+_tensorray.use_programs_in(_programs())
 
 #: Why a ray ended; index it with the numbers in `Trace.ends` and `Landings.ends`.
 RAY_ENDS: _typing.Tuple[str, ...] = _tensorray.ray_ends
@@ -47,6 +48,3 @@ __all__ = ["Field", "INVARIANTS", "Landings", "Plate", "RAY_ENDS", "Render", "Sc
 def schema() -> _typing.Dict[str, _typing.Any]:
     """The JSON Schema of scenes, as a dictionary: all keys, their meanings, limits and defaults."""
     return _json.loads(_tensorray.schema())
-
-
-_programs.find()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import shutil
 import subprocess
 import tempfile
 import warnings
@@ -12,7 +13,7 @@ from typing import Any, Literal, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _programs, _tensorray
+from . import _tensorray
 from ._arguments import Path, Progress, json_of, module_field
 from ._progress import shown
 
@@ -175,7 +176,7 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
     """
     if not files:
         raise ValueError("import_file: give a file")
-    program = os.path.join(_programs.folder(), "tensorray-import")
+    program = os.path.join(programs(), "tensorray-import")
     if not os.path.exists(program):
         raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
     options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--cells": cells,
@@ -198,6 +199,17 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
             warnings.warn(message.removeprefix("warning: "), stacklevel=2)
         keys = json_of({"file": os.path.abspath(os.fspath(files[0]))})
         return Field._of(_tensorray.read_field(vdb, keys, "", "none", None), keys)
+
+
+def programs():
+    """The folder `bin` of the build folder, or of the prefix, that has this package; or that of another `tensorray`."""
+    parent = os.path.dirname(os.path.abspath(_tensorray.__file__))
+    while parent != os.path.dirname(parent):
+        if os.path.exists(os.path.join(parent, "bin", "tensorray")):
+            return os.path.join(parent, "bin")
+        parent = os.path.dirname(parent)
+    installed = shutil.which("tensorray")
+    return os.path.dirname(installed) if installed else "/usr/bin"
 
 
 def _run(command, report):

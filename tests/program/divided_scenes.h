@@ -27,11 +27,11 @@ inline const std::string lit_scene = R"({
 /// Paths above a plate with light. @param density  Of the light.
 inline std::string plate_under_paths(const std::string& density) {
   return fmt::format(R"({{
-  "field": {{"file": "field.vdb", "eigenvalues": "absolute", "scale": 4}}, "light": {{"photons": 20000}},
-  "receiver": {{"resolution": [40, 32]}},
+  "field": {{"file": "field.vdb", "eigenvalues": "absolute", "scale": 4}}, "light": {{"photons": 8000}},
+  "receiver": {{"resolution": [32, 24]}},
   "integrator": {{"type": "path_tracing", "max_samples": 8, "min_samples": 8, "context": {{"plate": true}},
                  "density": {{"kind": "{}"}}}},
-  "camera": {{"resolution": [40, 30]}}}})",
+  "camera": {{"resolution": [30, 22]}}}})",
                      density);
 }
 
@@ -39,13 +39,13 @@ inline std::string plate_under_paths(const std::string& density) {
 inline std::string plate_scene(const std::string& integrator, int photons = 20000) {
   return fmt::format(R"({{
   "field": {{"file": "field.vdb", "eigenvalues": "absolute", "scale": 4}}, "integrator": {},
-  "light": {{"photons": {}, "wavelengths": {{"count": 6}}}}, "receiver": {{"resolution": [64, 48]}}}})",
+  "light": {{"photons": {}, "wavelengths": {{"count": 6}}}}, "receiver": {{"resolution": [32, 24]}}}})",
                      integrator, photons);
 }
 
 inline const std::string gaussian_photons =
     R"({"type": "photon_distribution", "density": {"kind": "gaussian", "tau": 2}})";
 inline const std::string lens = R"({"type": "lens", "samples": 2, "mode": "gather"})";
-inline const std::string stretch = R"({"type": "stretch"})";
+inline const std::string stretch = R"({"type": "stretch", "stretch": {"resolution": 24, "pixels": 96}})";
 
 }  // namespace tensorray::test

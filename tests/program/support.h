@@ -14,11 +14,13 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/data_folder.h"
 #include "tests/scenes/small_scene.h"
 
 namespace tensorray::test {
@@ -93,6 +95,33 @@ class Program : public ::testing::Test {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.status, 0) << outcome.error;
     return outcome;
+  }
+
+  /// Runs a script of tools/ with the test's folder as working folder. @param variables  "NAME=VALUE ..." for it.
+  Outcome run_script(const std::string& script, const std::string& arguments, const std::string& variables = "") const {
+    const std::string command = fmt::format("cd '{}' && {} '{}' {} >stdout 2>stderr", folder_.string(), variables,
+                                            (source_folder() / "tools" / script).string(), arguments);
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(in_folder("stdout")),
+            read_file(in_folder("stderr"))};
+  }
+
+  /// An error of a user: one line on standard error that has `text`. @param status  0: any but success.
+  static void expect_one_line(const Outcome& outcome, const std::string& text, int status = 0) {
+    EXPECT_TRUE(status == 0 ? outcome.status != 0 : outcome.status == status) << outcome.status << outcome.error;
+    EXPECT_NE(outcome.error.find(text), std::string::npos) << outcome.error << "\nexpected " << text;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  }
+
+  /// Runs the program, which must end so.
+  void expect_error(const std::string& text, const std::vector<std::string>& arguments, int status = 0) const {
+    expect_one_line(run(arguments), text, status);
+  }
+
+  bool has(const std::string& name) const { return std::filesystem::exists(in_folder(name)); }
+
+  bool is_equal(const std::string& a, const std::string& b) const {
+    return has(a) && has(b) && read_file(in_folder(a)) == read_file(in_folder(b));
   }
 
   void write(const std::string& name, const std::string& text) const {

@@ -23,7 +23,7 @@ from nbconvert.preprocessors import ExecutePreprocessor
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "notebooks")
 NAMES = sorted(name for name in os.listdir(FOLDER) if name.endswith(".ipynb"))
-MOST_BYTES, MOST_WIDTH = 1_000_000, 800
+MAX_BYTES = 1_000_000
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -101,12 +101,9 @@ class NotebooksTest(unittest.TestCase):
             with self.subTest(name):
                 notebook = nbformat.read(path_of(name), as_version=4)
                 nbformat.validate(notebook)
-                self.assertLess(os.path.getsize(path_of(name)), MOST_BYTES)
+                self.assertLess(os.path.getsize(path_of(name)), MAX_BYTES)
                 cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
-                pictures = [picture for cell in cells for picture in pictures_of(cell)]
-                self.assertTrue(pictures, "there are no outputs; store them with --store")
-                for picture in pictures:
-                    self.assertLessEqual(plt.imread(io.BytesIO(picture)).shape[1], MOST_WIDTH)
+                self.assertTrue(any(map(pictures_of, cells)), "there are no outputs; store them with --store")
                 for cell in cells:
                     self.assertNotRegex(texts_of(cell), r"(^|[\s'\"(=])(/\w+){2,}", "a path of the machine")
 

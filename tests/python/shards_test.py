@@ -72,18 +72,13 @@ class ShardsTest(unittest.TestCase):
 
     def test_the_bits_are_those_of_one_render(self):
         with processes() as pool:
-            for scene, shards, executor in ((PATHS, 40, None), (PATHS, 3, pool), (WHOLE, 3, None)):
-                parts = tr.render(scene, shards=shards, executor=executor, shard_folder=self.folder)
-                self.expect_same(parts, tr.render(scene))
+            for scene, shards, executor in ((PATHS, 40, None), (WHOLE, 3, pool), (PLATE, 3, None)):
+                whole, parts = (tr.render(scene, keep=["spectral", "photons"] if scene is PLATE else [], **more)
+                                for more in ({}, dict(shards=shards, executor=executor, shard_folder=self.folder)))
+                self.expect_same(parts, whole)
+        self.assertEqual(parts.spectral.tobytes(), whole.spectral.tobytes())
+        self.assertEqual(parts.photons.tobytes(), whole.photons.tobytes())
         self.assertEqual(os.listdir(self.folder), [])
-
-    def test_what_is_kept_beside_the_picture_is_the_same(self):
-        for changes in ({}, {"integrator.density.kind": "histogram"}):
-            whole, shards = (tr.render(PLATE, changes=changes, keep=["spectral", "photons"], shards=shards)
-                             for shards in (None, 3))
-            self.expect_same(shards, whole)
-            self.assertEqual(shards.spectral.tobytes(), whole.spectral.tobytes())
-            self.assertEqual(shards.photons.tobytes(), whole.photons.tobytes())
 
     def test_fields_come_along(self):
         made = tr.make("vortex", resolution=[9, 10, 11])

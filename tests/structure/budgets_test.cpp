@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/data_folder.h"
+#include "tests/structure/sources.h"
 
 namespace tensorray {
 namespace {
@@ -22,14 +22,11 @@ namespace fs = std::filesystem;
 std::map<std::string, long> lines_by_folder() {
   const std::set<std::string> endings{".h", ".cpp", ".py", ".ts", ".css", ".html"};
   std::map<std::string, long> lines;
-  for (fs::recursive_directory_iterator entry(test::source_folder()), end; entry != end; ++entry) {
-    const std::string name = entry->path().filename().string();
-    const bool is_made_here = name == "build" || name == "node_modules" || name.front() == '.';
-    if (entry->is_directory() && is_made_here) entry.disable_recursion_pending();
-    if (!entry->is_regular_file() || !endings.count(entry->path().extension().string())) continue;
-    std::ifstream file(entry->path());
+  for (const fs::path& path : test::files_of_project()) {
+    if (!endings.count(path.extension().string())) continue;
+    std::ifstream file(path);
     const long count = std::count(std::istreambuf_iterator<char>(file), {}, '\n');
-    fs::path folder = fs::relative(entry->path(), test::source_folder());
+    fs::path folder = fs::relative(path, test::source_folder());
     do {
       folder = folder.parent_path();
       lines[folder.string()] += count;

@@ -1,10 +1,11 @@
-// The links of all pages in Markdown: files, folders and pictures that exist, and headings, by the anchors that GitHub
-// gives them.
+// What pages in Markdown name exists: links of all pages lead to files, folders, pictures and headings, by the anchors
+// that GitHub gives them.
 
 #include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <istream>
+#include <iterator>
 #include <map>
 #include <regex>
 #include <set>
@@ -14,7 +15,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/data_folder.h"
+#include "tests/structure/sources.h"
 
 namespace tensorray {
 namespace {
@@ -93,21 +94,10 @@ std::string fault_of(const fs::path& page, const std::string& target) {
   return anchors_in(stream).count(target.substr(hash + 1)) ? "" : "no heading has this anchor";
 }
 
-/// All pages of the project.
-std::vector<fs::path> pages() {
-  std::vector<fs::path> found;
-  for (fs::recursive_directory_iterator entry(test::source_folder()), end; entry != end; ++entry) {
-    const std::string name = entry->path().filename().string();
-    const bool is_made_here = name == "build" || name == "node_modules" || name.front() == '.';
-    if (entry->is_directory() && is_made_here) entry.disable_recursion_pending();
-    if (entry->path().extension() == ".md") found.push_back(entry->path());
-  }
-  return found;
-}
-
 TEST(Links, LeadSomewhere) {
   std::size_t count = 0;
-  for (const fs::path& page : pages()) {
+  for (const fs::path& page : test::files_of_project()) {
+    if (page.extension() != ".md") continue;
     std::ifstream stream(page);
     for (const std::string& target : targets_in(stream)) {
       EXPECT_EQ(fault_of(page, target), "") << fs::relative(page, test::source_folder()).string() << ": " << target;
@@ -128,6 +118,26 @@ TEST(Links, LeadFromTheReadmeToEachPageForUsers) {
         const fs::path page = fs::relative(entry.path(), test::source_folder());
         EXPECT_TRUE(linked.count(page)) << "README.md does not link to " << page;
       }
+}
+
+/// The table of docs/dev/interfaces.md, the newcomer's page: paths exist, and types are in a file of the same row.
+TEST(Links, OfTheInterfacesNameWhatExists) {
+  static const std::regex code("`([^`]*)`");
+  std::ifstream page(test::source_folder() / "docs" / "dev" / "interfaces.md");
+  for (std::string row; std::getline(page, row);) {
+    if (row.rfind("| [", 0) != 0) continue;
+    std::string sources;
+    for (const bool is_path : {true, false})
+      for (std::sregex_iterator match(row.begin(), row.end(), code), end; match != end; ++match) {
+        const std::string name = (*match)[1];
+        if (is_path != (name.find('/') != std::string::npos)) continue;
+        const fs::path file = test::source_folder() / name;
+        EXPECT_TRUE(is_path ? fs::exists(file) : std::regex_search(sources, std::regex("\\b" + name + "\\b"))) << name;
+        if (!is_path || !fs::is_regular_file(file)) continue;
+        std::ifstream stream(file);
+        sources.append(std::istreambuf_iterator<char>(stream), {});
+      }
+  }
 }
 
 }  // namespace

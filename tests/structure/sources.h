@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/structure/sources.h
-/// The sources of the project as lines of text, for tests of rules about sources.
+/// The files of the project, and its sources as lines of text, for tests of rules about them.
 
 #include <filesystem>
 #include <fstream>
@@ -22,6 +22,18 @@ struct Line {
   bool is_under(const std::string& parent) const { return file.rfind(parent + "/", 0) == 0; }
   bool is_of_header() const { return std::filesystem::path(file).extension() == ".h"; }
 };
+
+/// All files of the project, and none that a build has made.
+inline std::vector<std::filesystem::path> files_of_project() {
+  std::vector<std::filesystem::path> files;
+  for (std::filesystem::recursive_directory_iterator entry(source_folder()), end; entry != end; ++entry) {
+    const std::string name = entry->path().filename().string();
+    const bool is_made_here = name == "build" || name == "node_modules" || name.front() == '.';
+    if (entry->is_directory() && is_made_here) entry.disable_recursion_pending();
+    if (entry->is_regular_file()) files.push_back(entry->path());
+  }
+  return files;
+}
 
 /// The folders with C++ in the source folder. Each has a CMakeLists.txt. The folder tests is not among them.
 inline std::set<std::string> top_folders() {

@@ -1,5 +1,6 @@
 #include "tools/command_line/run_and_report.h"
 
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include <CLI/Error.hpp>
 #include <unistd.h>
 
+#include "base/process/child_program.h"
 #include "base/process/process_limits.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"
@@ -86,6 +88,21 @@ int run_and_report(const std::function<void()>& work) {
   } catch (...) {
     return report("failed for an unknown reason", failed);
   }
+}
+
+int answer_parent(const std::function<void()>& work) {
+  end_with_parent();
+  limit_memory();
+  std::signal(SIGXFSZ, SIG_IGN);
+  try {
+    work();
+    return 0;
+  } catch (const std::bad_alloc&) {
+    print_error("it does not fit in memory\n");
+  } catch (const std::exception& error) {
+    print_error(std::string(error.what()) + "\n");
+  }
+  return failed;
 }
 
 }  // namespace tensorray

@@ -21,4 +21,8 @@ std::string reason_of(const std::exception& error);
 /// @return the exit status: 0 done, 1 failed, 2 the command line or the scene is wrong, 130 interrupted.
 int run_and_report(const std::function<void()>& work);
 
+/// The same for the program that started this one with run_program (base/process/child_program.h): ends with it, takes
+/// no more memory than there is, and prints an error without the program's name.
+int answer_parent(const std::function<void()>& work);
+
 }  // namespace tensorray

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -205,13 +204,7 @@ void explore(const ExploreOptions& options, Progress& progress) {
   bar.reset();
   if (!options.sheet.empty())
     files.front().write([&](const std::filesystem::path& path) { write_image(path, sheet.image()); });
-  if (!picked.empty())
-    files.back().write([&](const std::filesystem::path& path) {
-      std::ofstream stream(path, std::ios::binary);
-      stream << parse_value(picked).dump(2) << "\n";
-      stream.close();
-      if (!stream) throw std::runtime_error("cannot write " + path.string() + ": the disk may be full");
-    });
+  if (!picked.empty()) files.back().write_text(parse_value(picked).dump(2) + "\n");
   commit_all(files);
   if (options.quiet) return;
   for (const std::string& file : {options.sheet, options.scene_copy})

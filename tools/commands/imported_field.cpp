@@ -1,14 +1,18 @@
 #include "tools/commands/imported_field.h"
 
+#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 #include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "base/process/child_program.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
 #include "tools/command_line/tell.h"
+#include "tools/commands/commands.h"
 
 namespace tensorray {
 namespace {
@@ -28,14 +32,26 @@ std::string last_line(std::string text) {
   return text.rfind(name, 0) == 0 ? text.substr(name.size()) : text;
 }
 
-}  // namespace
-
+/// @throw std::runtime_error if it is not built.
 std::filesystem::path import_program() {
   const std::filesystem::path program = sibling_program("tensorray-import");
   if (!std::filesystem::exists(program))
     throw std::runtime_error("imports need " + program.string() +
                              ", which is not built; run `tools/setup release import`");
   return program;
+}
+
+}  // namespace
+
+void add_import_command(CLI::App& program) {
+  program.add_subcommand("import", "Make a tensor field of another program's file");
+}
+
+void become_import_program(char** arguments) {
+  // A library that VTK may bring (UCX, of MPI) otherwise prints a trace of calls when the reader of a damaged file
+  // crashes; tensorray says it in one line.
+  setenv("UCX_HANDLE_ERRORS", "none", 0);
+  become_program(import_program(), arguments);
 }
 
 bool needs_import(const std::filesystem::path& path) {
@@ -48,14 +64,8 @@ bool needs_import(const std::filesystem::path& path) {
 ImportedField::ImportedField(const std::filesystem::path& file, const ImportChoices& choices, bool quiet)
     : path_(folder_ / "field.vdb") {
   std::vector<std::string> arguments{"-o", path_.string(), "-q"};
-  const auto add = [&](const char* option, const std::string& value) {
+  for (const auto& [option, value] : choices)
     if (!value.empty()) arguments.insert(arguments.end(), {option, value});
-  };
-  add("--order", choices.order);
-  add("--array", choices.array);
-  add("--gradient-of", choices.gradient_of);
-  add("--frame", choices.frame);
-  if (choices.memory > 0) add("--memory", std::to_string(choices.memory));
   arguments.insert(arguments.end(), {"--", file.string()});
   const ProgramEnd end = run_program(import_program(), arguments, UnnamedFile());
   if (end.signal != 0) throw std::runtime_error(file.string() + ": the import crashed; the file may be damaged");

@@ -2,19 +2,16 @@
 /// @file tools/commands/imported_field.h
 /// Renders another program's file without a separate import.
 
-#include <cstddef>
 #include <filesystem>
+#include <map>
 #include <string>
 
 #include "base/files/temporary_folder.h"
 
 namespace tensorray {
 
-/// The choices of an import that a render offers, as the options of `tensorray import`; empty: none.
-struct ImportChoices {
-  std::string order, array, gradient_of, frame;
-  std::size_t memory = 0;  ///< What the making of the field works with, bytes; 0: no field in files.
-};
+/// Options of `tensorray import` that a render has, too, and their values; empty: not given.
+using ImportChoices = std::map<std::string, std::string>;
 
 /// Whether a path names a file that is neither a scene nor an OpenVDB file.
 bool needs_import(const std::filesystem::path& path);
@@ -32,8 +29,5 @@ class ImportedField {
   TemporaryFolder folder_;
   std::filesystem::path path_;
 };
-
-/// The program that imports. @throw std::runtime_error if it is not built.
-std::filesystem::path import_program();
 
 }  // namespace tensorray

@@ -14,7 +14,6 @@
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
 #include "tools/ranks/ranks.h"
-#include "tools/rendering/frames.h"
 #include "tools/rendering/render_scene.h"
 
 namespace tensorray {
@@ -90,8 +89,7 @@ void report_failed(const std::vector<int>& failed) {
 /// The flags of an import as they were given, each after a blank.
 std::string flags_of(const ImportChoices& import) {
   std::string flags;
-  for (const auto& [flag, value] : {std::pair("--order", import.order), std::pair("--array", import.array),
-                                    std::pair("--gradient-of", import.gradient_of), std::pair("--frame", import.frame)})
+  for (const auto& [flag, value] : import)
     if (!value.empty()) flags += fmt::format(" {} '{}'", flag, printable(value));
   return flags;
 }
@@ -113,7 +111,7 @@ void render_import(const std::string& file, SceneChanges changes, const RenderOp
   for (const std::filesystem::path& output : changes.outputs) outputs.push_back({output, "-o"});
   require_distinct_files({{file, "the input"}}, outputs);
   ImportChoices choices = options.import;
-  choices.memory = options.run.memory;
+  if (options.run.memory > 0) choices["--memory"] = std::to_string(options.run.memory);
   const ImportedField field(file, choices, options.run.quiet);
   RenderRun run = options.run;
   run.keeping.is_on = false;  // The field does not stay.
@@ -168,11 +166,11 @@ void render_alone_or_with_others(const RenderOptions& options, Progress& progres
 }
 
 void add_import_options(CLI::App& command, ImportChoices& import) {
-  command.add_option("--order", import.order, "Of the tensor's components, as for `tensorray import`")->group("Import");
-  command.add_option("--array", import.array, "The array that is the tensor, likewise")->group("Import");
-  command.add_option("--gradient-of", import.gradient_of, "The velocity whose gradient it is, likewise")
-      ->group("Import");
-  command.add_option("--frame", import.frame, "The axes of the components, likewise")->group("Import");
+  for (const auto& [flag, meaning] : {std::pair("--order", "Of the tensor's components, as for `tensorray import`"),
+                                      std::pair("--array", "The array that is the tensor, likewise"),
+                                      std::pair("--gradient-of", "The velocity whose gradient it is, likewise"),
+                                      std::pair("--frame", "The axes of the components, likewise")})
+    command.add_option(flag, import[flag], meaning)->group("Import");
 }
 
 }  // namespace

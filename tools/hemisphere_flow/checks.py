@@ -4,8 +4,9 @@
 import math
 import sys
 
-from flow_file import read_flow, sample
-from shape import INCIDENCE, MACH, distance_to_body
+import numpy as np
+
+from flow import INCIDENCE, MACH, NAME, distance_to_body, point_data, read_flow, sample
 
 GAMMA = 1.4
 
@@ -19,55 +20,35 @@ def pitot_ratio(mach):
 
 def stagnation_pressure(flow):
     """The greatest pressure, and how far from the nose it is, towards the oncoming flow (degrees)."""
-    pressure = flow.GetPointData().GetArray("p")
-    most = max(range(flow.GetNumberOfPoints()), key=pressure.GetValue)
-    x, _, z = flow.GetPoint(most)
-    return pressure.GetValue(most), math.degrees(math.atan2(-z, -x))
+    pressure = point_data(flow, "p")
+    x, _, z = flow.GetPoint(int(pressure.argmax()))
+    return pressure.max(), math.degrees(math.atan2(-z, -x))
 
 
 def stand_off(flow, direction):
     """Distance from the cap to where the pressure has risen half-way to its value behind a normal shock."""
     half_way = 1 + GAMMA / (GAMMA + 1) * (MACH * MACH - 1)
-    distances = [0.005 * n for n in range(1, 1200)]
-    data, _ = sample(flow, [tuple((1 + d) * component for component in direction) for d in distances])
-    pressure = data.GetArray("p")
-    return max(d for n, d in enumerate(distances) if pressure.GetValue(n) > half_way)
+    distances = 0.005 * np.arange(1, 1200)
+    data, _ = sample(flow, np.outer(1 + distances, direction))
+    return distances[point_data(data, "p") > half_way].max()
 
 
 def vortex(flow, x):
     """The core above the body in the plane at x, y > 0: where the flow across turns fastest, clear of the wall's shear.
 
     (y, z, vorticity along x, angular speed of the swirl: the imaginary part of the 2x2 gradient's eigenvalues)."""
-    points = [(x, 0.02 * i, 0.8 + 0.02 * k) for i in range(1, 100) for k in range(100)]
-    points = [point for point in points if distance_to_body(*point) > 0.15]
-    data, _ = sample(flow, points)
-    gradient = data.GetArray("velocity_gradient")
-
-    def swirl(n):
-        yy, yz, zy, zz = (gradient.GetComponent(n, c) for c in (4, 5, 7, 8))
-        return math.sqrt(max(0.0, -yz * zy - (yy - zz) ** 2 / 4))
-
-    core = max(range(len(points)), key=swirl)
-    vorticity = gradient.GetComponent(core, 7) - gradient.GetComponent(core, 5)
-    return points[core][1], points[core][2], vorticity, swirl(core)
+    points = np.array([(x, 0.02 * i, 0.8 + 0.02 * k) for i in range(1, 100) for k in range(100)])
+    points = points[distance_to_body(points) > 0.15]
+    across = point_data(sample(flow, points)[0], NAME).reshape(-1, 3, 3)[:, 1:, 1:]
+    swirl = np.abs(np.linalg.eigvals(across).imag).max(axis=1)
+    core = swirl.argmax()
+    return points[core, 1], points[core, 2], across[core, 1, 0] - across[core, 0, 1], swirl[core]
 
 
-def downwash(flow, x):
-    """The least velocity along z above the body in the plane of symmetry, and its height; negative between two vortices."""
-    points = [(x, 0, 1.01 + 0.01 * n) for n in range(200)]
-    data, _ = sample(flow, points)
-    velocity = data.GetArray("U")
-    least = min(range(len(points)), key=lambda n: velocity.GetComponent(n, 2))
-    return velocity.GetComponent(least, 2), points[least][2]
-
-
-def min_axial_speed(flow):
-    """The least velocity along x above the body in the plane of symmetry, and where; negative where the flow is separated."""
-    points = [(0.1 * i, 0, 1.02 + 0.02 * k) for i in range(60) for k in range(40)]
-    data, _ = sample(flow, points)
-    velocity = data.GetArray("U")
-    least = min(range(len(points)), key=lambda n: velocity.GetComponent(n, 0))
-    return velocity.GetComponent(least, 0), points[least]
+def min_speed(flow, points, axis):
+    """The least velocity along an axis, and where."""
+    speeds = point_data(sample(flow, points)[0], "U")[:, axis]
+    return speeds.min(), points[speeds.argmin()]
 
 
 def main(path):
@@ -79,11 +60,12 @@ def main(path):
     against = (-math.cos(INCIDENCE), 0, -math.sin(INCIDENCE))
     print(f"bow shock {stand_off(flow, (-1, 0, 0)):.2f} radii before the nose (expected 1.4), ", end="")
     print(f"{stand_off(flow, against):.2f} before the stagnation point")
-    speed, (x, _, z) = min_axial_speed(flow)
+    # Above the body in the plane of symmetry.
+    speed, (x, _, z) = min_speed(flow, [(0.1 * i, 0, 1.02 + 0.02 * k) for i in range(60) for k in range(40)], 0)
     print(f"lee side, plane of symmetry: least u {speed:+.3f} at x = {x:.1f}, z = {z:.2f} (negative: separated)")
     for x in (4, 5, 6):
         y, z, vorticity, swirl = vortex(flow, x)
-        speed, height = downwash(flow, x)
+        speed, (_, _, height) = min_speed(flow, [(x, 0, 1.01 + 0.01 * n) for n in range(200)], 2)
         print(f"x = {x}: vortices at y = +-{y:.2f}, z = {z:.2f}, ", end="")
         print(f"vorticity along x {vorticity:+.2f} where y > 0, swirl {swirl:.2f}; ", end="")
         print(f"between them w falls to {speed:+.3f} at z = {height:.2f}")

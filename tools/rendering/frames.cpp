@@ -1,5 +1,3 @@
-#include "tools/rendering/frames.h"
-
 #include <algorithm>
 #include <exception>
 #include <iterator>
@@ -14,6 +12,7 @@
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
+#include "tools/rendering/render_scene.h"
 #include "tools/rendering/run_outputs.h"
 
 namespace tensorray {

@@ -95,8 +95,8 @@ void write_or_keep(const Scene& scene, const Render& result, Checkpoint& checkpo
       files.at(shard_key).write([&](const std::filesystem::path& path) { write_work(path, checkpoint.shard()); });
     write_outputs(result, scene, files);
     if (!run.statistics.empty())
-      write_text(files.at(statistics_key), run_statistics(scene, result.statistics, seconds_since(start), run));
-    if (!run.scene_copy.empty()) write_text(files.at(scene_key), parse_value(scene.description.text).dump(2) + "\n");
+      files.at(statistics_key).write_text(run_statistics(scene, result.statistics, seconds_since(start), run));
+    if (!run.scene_copy.empty()) files.at(scene_key).write_text(parse_value(scene.description.text).dump(2) + "\n");
     commit_outputs(std::move(files));
   } catch (const std::exception&) {  // The disk may be full.
     if (checkpoint.write())

@@ -1,7 +1,7 @@
 #pragma once
 /// @file tools/rendering/render_scene.h
-/// Renders a scene file and writes its outputs. Its drivers: frames.h renders sequences, checkpoint.h keeps the work
-/// and continues it, rank_scene.h gives the scene to other ranks.
+/// Renders a scene file and writes its outputs. Its drivers: frames.cpp renders sequences, checkpoint.h keeps the
+/// work and continues it, rank_scene.h gives the scene to other ranks.
 
 #include <filesystem>
 #include <optional>
@@ -46,6 +46,13 @@ struct RenderRun {
 /// @throw SceneError, std::invalid_argument, std::runtime_error, Cancelled; Interrupted.
 void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
                   Progress& progress);
+
+/// Renders frames of a scene (see set_frame), one after the other; of ranks, each renders every so many. The scale and
+/// the direction `auto` are those of the first frame. A field that does not change is loaded once.
+/// @return the frames that failed, where the run keeps going, at the root; they were named on standard error.
+/// @throw as render_scene; SceneError if the names of files do not count frames, so that one would replace another.
+std::vector<int> render_frames(const std::filesystem::path& scene_file, SceneChanges changes, std::vector<int> frames,
+                               const RenderRun& run, Progress& progress);
 
 /// Makes the pictures of a scene of shards, whose results must be all there are, and those of the scene.
 /// @throw as render_scene.

@@ -1,8 +1,5 @@
 #include "tools/rendering/run_outputs.h"
 
-#include <fstream>
-#include <stdexcept>
-
 #include <fmt/format.h>
 
 #include "base/files/distinct_files.h"
@@ -26,15 +23,6 @@ void check_scene_copy(const std::filesystem::path& scene, const std::filesystem:
 }
 
 }  // namespace
-
-void write_text(OutputFile& file, const std::string& text) {
-  file.write([&](const std::filesystem::path& path) {
-    std::ofstream stream(path, std::ios::binary);
-    stream << text;
-    stream.close();
-    if (!stream) throw std::runtime_error("cannot write " + path.string() + ": the disk may be full");
-  });
-}
 
 OutputFiles open_files(const SceneDescription& description, const RenderRun& run) {
   check_scene_copy(description.path, run.scene_copy);

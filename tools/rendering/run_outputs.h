@@ -16,9 +16,6 @@ namespace tensorray {
 /// Keys among the outputs, because all files are committed together.
 inline const std::string statistics_key = "--stats", scene_key = "--save-scene", shard_key = "--shard";
 
-/// Writes the text to an output. @throw std::runtime_error: the disk may be full.
-void write_text(OutputFile& file, const std::string& text);
-
 /// All files that the run will write. @throw SceneError; std::runtime_error naming one that cannot be written.
 OutputFiles open_files(const SceneDescription& description, const RenderRun& run);
 

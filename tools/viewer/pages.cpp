@@ -90,19 +90,6 @@ Json parsed(const std::string& text) {
   return message;
 }
 
-/// Calls a function at the end of its life, however that comes.
-template <class Function>
-class WhenLeft {
- public:
-  explicit WhenLeft(Function function) : function_(std::move(function)) {}
-  ~WhenLeft() { function_(); }
-  WhenLeft(const WhenLeft&) = delete;
-  WhenLeft& operator=(const WhenLeft&) = delete;
-
- private:
-  Function function_;
-};
-
 double number(const Json& message, const char* key) {
   const auto found = message.find(key);
   if (found == message.end() || !found->is_number())
@@ -270,7 +257,7 @@ void Pages::make_stage(const PagePointer& page) {
     progress_.cancelled = ends_;
     rendering_ = {page, is_first};
   }
-  const WhenLeft end([&] { end_work(); });
+  const std::shared_ptr<void> end(nullptr, [&](void*) { end_work(); });  // However this function ends.
   auto last = Clock::now();
   bool is_loaded = false;  // Before, the scene is that of the last picture, perhaps of another page.
   progress_.report = [&](const std::string& phase, std::uint64_t done, std::uint64_t total) {
@@ -406,12 +393,7 @@ void Pages::save(Page& page, const Json& message) {
   check(message["scene"]);
   require_no_device(viewed_.copy);
   OutputFile file(viewed_.copy);
-  file.write([&](const std::filesystem::path& path) {
-    std::ofstream stream(path, std::ios::binary);
-    stream << message["scene"].dump(2) << "\n";
-    stream.close();
-    if (!stream) throw std::runtime_error("cannot write " + path.string() + ": the disk may be full");
-  });
+  file.write_text(message["scene"].dump(2) + "\n");
   file.commit();
   page.send(text_message(answer_to(message, "saved", {{"file", viewed_.copy.string()}})));
 }
@@ -428,7 +410,7 @@ void Pages::export_file(const PagePointer& pointer, const Json& message) {
     progress_.cancelled = ends_;
     rendering_ = {pointer, false};
   }
-  const WhenLeft end([&] { end_work(); });
+  const std::shared_ptr<void> end(nullptr, [&](void*) { end_work(); });  // However this function ends.
   const std::shared_ptr<const Render> render = live_.render(progress_);
   const std::filesystem::path file = folder_ / ("export" + ending);
   for (const Output& output : picture_outputs())

@@ -1,9 +1,6 @@
 // tools/clip: makes a clip of the frames of a sequence.
 
-#include <fmt/core.h>
-
 #include "renderer/images/image.h"
-#include "tests/data_folder.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
@@ -20,20 +17,13 @@ class Clip : public Program {
         "receiver": {"resolution": [33, 24]}, "integrator": {"type": "photon_distribution"}})");
     run_well({"render", "scene.json", "-q", "--frames", "1-9x4", "-o", "frame.##.png"});
   }
-
-  Outcome clip(const std::string& arguments, const std::string& before = "") const {
-    const std::string command = fmt::format("cd '{}' && {} '{}' {} >out 2>error", in_folder("").string(), before,
-                                            (source_folder() / "tools/clip").string(), arguments);
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(in_folder("out")), read_file(in_folder("error"))};
-  }
 };
 
 TEST_F(Clip, HasAllFrames) {
   if (std::system("command -v ffmpeg >/dev/null && command -v ffprobe >/dev/null") != 0)
     GTEST_SKIP() << "ffmpeg is not installed";
   for (const char* name : {"a.mp4", "a.gif"}) {
-    const Outcome outcome = clip(fmt::format("'frame.##.png' {} 12", name));
+    const Outcome outcome = run_script("clip", fmt::format("'frame.##.png' {} 12", name));
     ASSERT_EQ(outcome.status, 0) << outcome.error;
     EXPECT_EQ(outcome.out, fmt::format("wrote {}, 3 frames\n", name));
     const std::string probe = fmt::format(
@@ -49,7 +39,7 @@ TEST_F(Clip, HasAllFrames) {
 
 TEST_F(Clip, APictureIsASheetOfAllFrames) {
   if (std::system("command -v ffmpeg >/dev/null") != 0) GTEST_SKIP() << "ffmpeg is not installed";
-  const Outcome outcome = clip("'frame.##.png' sheet.png");
+  const Outcome outcome = run_script("clip", "'frame.##.png' sheet.png");
   ASSERT_EQ(outcome.status, 0) << outcome.error;
   const Image sheet = read_image(in_folder("sheet.png")), first = read_image(in_folder("frame.01.png"));
   EXPECT_EQ(sheet.width, 2 * first.width);  // Three frames: two rows.
@@ -62,12 +52,7 @@ TEST_F(Clip, ErrorsAreOneLine) {
                                                        {"'frame.##.png' a.mp4 fast", "is no number of frames a second"},
                                                        {"'frame.##.png' frame.05.png", "is one of the frames"},
                                                        {"'frame.##.png'", "give the frames"}};
-  for (const auto& [arguments, text] : wrong) {
-    const Outcome outcome = clip(arguments);
-    EXPECT_EQ(outcome.status, 2) << arguments;
-    EXPECT_NE(outcome.error.find(text), std::string::npos) << outcome.error;
-    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
-  }
+  for (const auto& [arguments, text] : wrong) expect_one_line(run_script("clip", arguments), text, 2);
 }
 
 }  // namespace

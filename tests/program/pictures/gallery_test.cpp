@@ -8,7 +8,6 @@
 #include <numeric>
 
 #include "renderer/images/image.h"
-#include "tests/data_folder.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
@@ -64,11 +63,9 @@ class Gallery : public Program {
 
   /// Runs tools/gallery, which must succeed. @return what it prints.
   std::string gallery(const std::string& arguments) const {
-    const std::string command = "TENSORRAY_DATA=" + quoted(data_folder()) + " " +
-                                quoted(source_folder() / "tools" / "gallery") + " " + arguments + " >" +
-                                quoted(in_folder("stdout")) + " 2>/dev/null";
-    EXPECT_EQ(std::system(command.c_str()), 0) << command << "\n" << read_file(in_folder("stdout"));
-    return read_file(in_folder("stdout"));
+    const Outcome outcome = run_script("gallery", arguments, "TENSORRAY_DATA=" + quoted(data_folder()));
+    EXPECT_EQ(outcome.status, 0) << arguments << "\n" << outcome.out;
+    return outcome.out;
   }
 };
 

@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 #include <sys/stat.h>
 
+#include "tests/data_folder.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
@@ -77,12 +78,9 @@ TEST_F(Errors, FieldFiles) {
   };
   write("scene.json", small_scene());
   run_well({"make", "shear", "-o", "good.vdb", "--resolution", "12"});
-  expect_error(1, "none.vdb", render("none.vdb"));
   expect_error(1, "good.vdb.*cheese.*shear", render("good.vdb", "cheese"));
-  const std::string bytes = read_file(in_folder("good.vdb"));
-  write("cut.vdb", bytes.substr(0, bytes.size() / 2));
   write("text.vdb", "this is no VDB");
-  for (const char* file : {"cut.vdb", "text.vdb", "none.vdb"}) {
+  for (const char* file : {"text.vdb", "none.vdb"}) {
     expect_error(1, file, render(file));
     expect_error(1, file, {"info", file});
   }
@@ -92,35 +90,12 @@ TEST_F(Errors, Meshes) {
   expect_scene_error(1, "none.ply", R"(obstacles=[{"file":"none.ply"}])");
   write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   expect_scene_error(1, "open.obj.*3 open edges|open.obj.*closed", "field.bounds=open.obj");
-  write("text.obj", "cheese");
-  expect_scene_error(1, "text.obj", R"(obstacles=[{"file":"text.obj"}])");
 }
 
 std::string repeated(const std::string& text, int times) {
   std::string all;
   for (int i = 0; i < times; ++i) all += text;
   return all;
-}
-
-std::string collada(const std::string& libraries) {
-  return "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">" +
-         libraries + "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
-}
-
-/// A triangle whose positions have this stride, and whose face is this.
-std::string collada_triangle(const std::string& stride, const std::string& face) {
-  return collada(
-      "<library_geometries><geometry id=\"g\"><mesh><source id=\"p\"><float_array id=\"f\" count=\"9\">0 0 0 "
-      "1 0 0 0 1 0</float_array><technique_common><accessor source=\"#f\" count=\"3\" stride=\"" +
-      stride +
-      "\"><param name=\"X\" type=\"float\"/><param name=\"Y\" type=\"float\"/><param name=\"Z\" "
-      "type=\"float\"/></accessor></technique_common></source><vertices id=\"v\"><input "
-      "semantic=\"POSITION\" source=\"#p\"/></vertices><polygons count=\"1\"><input semantic=\"VERTEX\" "
-      "source=\"#v\" offset=\"0\"/>" +
-      face +
-      "</polygons></mesh></geometry></library_geometries>"
-      "<library_visual_scenes><visual_scene id=\"s\"><node id=\"n\"><instance_geometry url=\"#g\"/></node>"
-      "</visual_scene></library_visual_scenes>");
 }
 
 /// Files that end their reader, or that it would read for ever.
@@ -130,27 +105,21 @@ TEST_F(Errors, HostileMeshes) {
   ASSERT_EQ(mkfifo(in_folder("pipe").c_str(), 0600), 0);
   std::string chain = R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [)";
   for (int i = 1; i < 100000; ++i) chain += "{\"children\": [" + std::to_string(i) + "]},";
-  const std::string scene = "<library_visual_scenes><visual_scene id=\"s\">";
-  const std::vector<std::pair<std::string, std::string>> all{
+  const std::pair<std::string, std::string> deep[] = {
       {"nested.gltf", repeated("[", 200000)},
       {"objects.gltf", repeated("{\"a\":", 200000)},
       {"chain.gltf", chain + "{}]}"},
-      {"pipe.gltf", R"({"asset": {"version": "2.0"}, "buffers": [{"uri": "pipe", "byteLength": 100}], "bufferViews":
-          [{"buffer": 0, "byteLength": 36}], "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type":
-          "VEC3"}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "nodes": [{"mesh": 0}], "scenes":
-          [{"nodes": [0]}], "scene": 0})"},
-      {"nested.dae", collada(scene + repeated("<node>", 50000) + repeated("</node>", 50000) +
-                             "</visual_scene></library_visual_scenes>")},
-      {"itself.dae", collada(scene + "<node id=\"n\"><instance_node url=\"#n\"/></node></visual_scene>"
-                                     "</library_visual_scenes>")},
-      {"stride.dae", collada_triangle("4000000000", "<p>0 1 2</p>")},
-      {"face.dae", collada_triangle("3", "<p></p>")},
-      {"index.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 4294967295\n"},
+      {"nested.dae",
+       "<COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+       "<library_visual_scenes><visual_scene id=\"s\">" +
+           repeated("<node>", 50000) + repeated("</node>", 50000) +
+           "</visual_scene></library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>"},
       {"nested.fbx", "; FBX 7.4.0 project file\n" + repeated("A: {\n", 100000) + repeated("}\n", 100000)}};
-  for (const auto& [name, text] : all) {
-    write(name, text);
-    expect_error(1, name, {"render", "scene.json", "-q", "--set", "obstacles=[{\"file\": \"" + name + "\"}]"});
-  }
+  for (const auto& [name, text] : deep) write(name, text);
+  std::filesystem::copy(source_folder() / "tests" / "program" / "hostile_meshes", in_folder(""));
+  for (const std::string& name : files())
+    if (name != "scene.json" && name != "pipe")
+      expect_error(1, name, {"render", "scene.json", "-q", "--set", "obstacles=[{\"file\": \"" + name + "\"}]"});
 }
 
 TEST_F(Errors, OddLightIsWarnedOf) {

@@ -37,7 +37,7 @@ const std::vector<Command> commands{
      {"render", "INPUTS/scene.json", "-o", "RESULTS/a.png", "--checkpoint", "0.001", "--stats", "RESULTS/a.stats"},
      {"a.png"}},
     {"merge", {"merge", "INPUTS/1.shard", "INPUTS/2.shard", "-o", "RESULTS/m.png"}, {"m.png"}},
-    {"import", {"import", "INPUTS/tensors.npy", "-o", "RESULTS/i.vdb"}, {"i.vdb"}},
+    {"import", {"import", "INPUTS/tensors.nrrd", "-o", "RESULTS/i.vdb"}, {"i.vdb"}},
     {"view", {"view", "INPUTS/scene.json", "--port", "0"}, {}}};
 
 // Names of 255 bytes, which are the longest.
@@ -74,25 +74,17 @@ class Surroundings : public Program {
     std::filesystem::create_directories(in_folder("inputs"));
     write("inputs/scene.json", R"({"field": {"file": "field.vdb", "scale": 4}, "camera": {"resolution": [24, 20]},
         "integrator": {"type": "path_tracing", "max_samples": 4, "min_samples": 4, "seeds": {"count": 9}}})");
-    write("inputs/tensors.npy", npy_of_zeros_and_ones());
+    std::string tensors;
+    for (int i = 0; i < 2 * 3 * 4; ++i) tensors += "1.5 0 0.25 2 0 3\n";
+    write("inputs/tensors.nrrd",
+          "NRRD0005\ntype: float\ndimension: 4\nspace: right-anterior-superior\nsizes: 6 2 3 4\n"
+          "space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: 3D-symmetric-matrix space space space\n"
+          "encoding: ascii\n\n" +
+              tensors);
     run_well({"make", "point_load", "-o", "inputs/field.vdb", "--resolution", "9"});
     for (const char* part : {"1", "2"})
       run_well({"render", "inputs/scene.json", "-q", "--shard", std::string(part) + "/2", "-o",
                 "inputs/" + std::string(part) + ".shard"});
-  }
-
-  /// 2 × 3 × 4 tensors of nine doubles.
-  static std::string npy_of_zeros_and_ones() {
-    std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3, 4, 3, 3), }";
-    header.resize(117, ' ');
-    header += '\n';
-    std::string file("\x93NUMPY\x01\x00\x76\x00", 10);
-    file += header;
-    for (int i = 0; i < 2 * 3 * 4 * 9; ++i) {
-      const double value = i % 5 == 0 ? 1 : 0;
-      file.append(reinterpret_cast<const char*>(&value), sizeof value);
-    }
-    return file;
   }
 
   std::vector<std::string> arguments_of(const Command& command, const std::filesystem::path& results) const {

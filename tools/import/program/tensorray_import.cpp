@@ -10,7 +10,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "tools/command_line/answer_parent.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"

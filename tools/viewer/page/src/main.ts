@@ -46,7 +46,7 @@ const scenes = new Throttle<JsonObject>((scene) => {
   return id;
 });
 const looks = new Throttle<[number, number]>(([x, y]) => connection.send({ type: "look", x, y }));
-const spaces = new Throttle<true>(() => connection.send({ type: "space" }));
+const spaces = new Throttle<true>(() => connection.send({ type: "space" }), space_interval);
 
 function ask_and_tell(request: Request): number | null {
   const id = connection.send(request);
@@ -150,11 +150,11 @@ function on_picture(header: PictureHeader, content: Uint8Array<ArrayBuffer>): vo
   by_id<HTMLButtonElement>("export-png").disabled = !header.final;
   by_id<HTMLButtonElement>("export-exr").disabled = !header.final;
   if (header.final) {
-    ask_space(true);
+    spaces.ask(true);
     if (picture.mark) looks.ask(picture.mark);
   } else if (header.stage === 0) {
     read_out.age();
-    ask_space(false);
+    spaces.ask(true);
   }
 }
 
@@ -173,23 +173,6 @@ function on_error(failure: Failure): void {
 function rendered_method(): string {
   const integrator = (sent_scene ?? state.scene)["integrator"] as JsonObject | undefined;
   return String(integrator?.["type"] ?? "");
-}
-
-let last_space = 0;
-let space_timer = 0;
-
-/** @param late  The content is of a finished picture: it is asked for in any case, later if need be. */
-function ask_space(late: boolean): void {
-  const wait = last_space + space_interval - Date.now();
-  if (wait > 0) {
-    if (late) {
-      clearTimeout(space_timer);
-      space_timer = window.setTimeout(() => ask_space(true), wait);
-    }
-    return;
-  }
-  last_space = Date.now();
-  spaces.ask(true);
 }
 
 let address_timer = 0;

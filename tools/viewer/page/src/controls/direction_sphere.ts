@@ -1,25 +1,28 @@
 // A direction: a sphere that one turns, with the axes of the world as the 3D pane shows them.
 
-import { button, element, style_value } from "../elements/dom";
+import { Vector3 } from "three";
+import { axis_colors, button, element, on_arrow_keys, on_drag, style_value } from "../elements/dom";
 import type { Vector } from "../state/protocol";
-import { dot, normalized, rounded, times, turned, vector_of } from "../state/vector";
 import type { Control, Key } from "./key";
 
 const size = 132;  // CSS pixels
 const radius = 54;
 const key_angle = (5 * Math.PI) / 180;
 
+/** To the canvas, and towards the viewer. */
+type Projection = (v: Vector3) => [number, number, number];
+
 export class DirectionSphere implements Control {
   readonly node: HTMLElement;
   private static readonly all: DirectionSphere[] = [];
-  private static view: { right: Vector; up: Vector; toward: Vector } = { right: [1, 0, 0], up: [0, 0, 1], toward: [0, -1, 0] };
+  private static view = { right: new Vector3(1, 0, 0), up: new Vector3(0, 0, 1), toward: new Vector3(0, -1, 0) };
   private readonly canvas: HTMLCanvasElement;
   private readonly text: HTMLOutputElement;
-  private readonly snaps: [Vector, HTMLButtonElement][] = [];
+  private readonly snaps: [Vector3, HTMLButtonElement][] = [];
 
   /** Turns all spheres as the 3D pane is turned. */
   static set_view(right: Vector, up: Vector, toward: Vector): void {
-    DirectionSphere.view = { right, up, toward };
+    DirectionSphere.view = { right: new Vector3(...right), up: new Vector3(...up), toward: new Vector3(...toward) };
     for (const sphere of DirectionSphere.all) sphere.draw();
   }
 
@@ -41,11 +44,10 @@ export class DirectionSphere implements Control {
     const snaps = element("div", { class: "snaps" });
     for (const [i, axis] of ["x", "y", "z"].entries()) {
       for (const sign of [1, -1]) {
-        const direction: Vector = [0, 0, 0];
-        direction[i] = sign;
+        const direction = new Vector3().setComponent(i, sign);
         const name = (sign > 0 ? "+" : "−") + axis;
         const snap = button(name, { "data-snap": (sign > 0 ? "+" : "-") + axis, "aria-label": key.dotted + " " + name }, () => {
-          key.set(direction);
+          key.set(direction.toArray());
           key.finish(false);
         });
         this.snaps.push([direction, snap]);
@@ -59,53 +61,35 @@ export class DirectionSphere implements Control {
 
   update(): void {
     const direction = this.direction;
-    this.text.textContent = direction ? direction.map((x) => x.toFixed(2).replace("-", "−")).join("  ") : "…";
+    this.text.textContent = direction ? direction.toArray().map((x) => x.toFixed(2).replace("-", "−")).join("  ") : "…";
     for (const [axis, snap] of this.snaps) {
-      const is_this = direction !== null && !this.key.automatic && dot(direction, axis) > 0.9999;
+      const is_this = direction !== null && !this.key.automatic && direction.dot(axis) > 0.9999;
       snap.setAttribute("aria-pressed", String(is_this));
     }
     this.draw();
   }
 
   /** Null if it is not known yet. */
-  private get direction(): Vector | null {
-    const direction = vector_of(this.key.value);
-    return direction && normalized(direction);
+  private get direction(): Vector3 | null {
+    const value = this.key.value;
+    const fits = Array.isArray(value) && value.length === 3 && value.every((x) => typeof x === "number");
+    return fits ? new Vector3(...(value as Vector)).normalize() : null;
   }
 
   private turn(horizontal: number, vertical: number): void {
     const { right, up, toward } = DirectionSphere.view;
-    this.key.set(rounded(turned(turned(this.direction ?? toward, up, horizontal), right, vertical)), " turned");
+    const turned = (this.direction ?? toward.clone()).applyAxisAngle(up, horizontal).applyAxisAngle(right, vertical);
+    // Few digits, for scene files.
+    this.key.set(turned.normalize().toArray().map((x) => Math.round(x * 1e4) / 1e4 + 0), " turned");
   }
 
   private listen(): void {
-    let last: [number, number] | null = null;
-    this.canvas.addEventListener("pointerdown", (event) => {
-      this.canvas.setPointerCapture(event.pointerId);
-      last = [event.clientX, event.clientY];
-    });
-    this.canvas.addEventListener("pointermove", (event) => {
-      if (!last) return;
-      this.turn((event.clientX - last[0]) / radius, (event.clientY - last[1]) / radius);
-      last = [event.clientX, event.clientY];
-    });
-    const end = (): void => {
-      if (last) this.key.finish(false);
-      last = null;
-    };
-    this.canvas.addEventListener("pointerup", end);
-    this.canvas.addEventListener("pointercancel", end);
-    this.canvas.addEventListener("keydown", (event) => {
-      const angle = event.shiftKey ? key_angle / 5 : key_angle;
-      const turns: Record<string, [number, number]> = {
-        ArrowLeft: [-angle, 0], ArrowRight: [angle, 0], ArrowUp: [0, -angle], ArrowDown: [0, angle],
-      };
-      const turn = turns[event.key];
-      if (!turn) return;
-      event.preventDefault();
-      this.turn(...turn);
+    on_drag(this.canvas, (x, y) => this.turn(x / radius, y / radius), () => this.key.finish(false));
+    const turn = (x: number, y: number): void => {
+      this.turn(key_angle * x, key_angle * y);
       this.key.finish(true);
-    });
+    };
+    on_arrow_keys(this.canvas, turn, 0.2);
   }
 
   private draw(): void {
@@ -113,11 +97,7 @@ export class DirectionSphere implements Control {
     if (!context) return;
     const middle = size / 2;
     const { right, up, toward } = DirectionSphere.view;
-    const shown = (v: Vector): [number, number, number] => [
-      middle + radius * dot(v, right),
-      middle - radius * dot(v, up),
-      dot(v, toward),
-    ];
+    const shown: Projection = (v) => [middle + radius * v.dot(right), middle - radius * v.dot(up), v.dot(toward)];
     context.clearRect(0, 0, size, size);
     const shade = context.createRadialGradient(middle - 18, middle - 22, 6, middle, middle, radius);
     shade.addColorStop(0, style_value("--sphere-light"));
@@ -134,16 +114,14 @@ export class DirectionSphere implements Control {
     if (this.direction) this.draw_arrow(context, this.direction, shown);
   }
 
-  private draw_axes(context: CanvasRenderingContext2D, shown: (v: Vector) => [number, number, number]): void {
+  private draw_axes(context: CanvasRenderingContext2D, shown: Projection): void {
     context.font = "bold 11px system-ui, sans-serif";
     context.textAlign = "center";
     context.textBaseline = "middle";
-    const axes: [string, string, Vector][] = [
-      ["x", "#d64545", [1, 0, 0]], ["y", "#3c9a3c", [0, 1, 0]], ["z", "#3d6fe0", [0, 0, 1]],
-    ];
-    for (const [name, color, axis] of axes) {
+    for (const [i, [name, color]] of Object.entries(axis_colors).entries()) {
+      const axis = new Vector3().setComponent(i, 1);
       const [x, y, depth] = shown(axis);
-      const [x0, y0] = shown(times(-1, axis));
+      const [x0, y0] = shown(axis.clone().negate());
       context.globalAlpha = depth < 0 ? 0.45 : 1;
       context.strokeStyle = context.fillStyle = color;
       context.lineWidth = 1;
@@ -151,19 +129,15 @@ export class DirectionSphere implements Control {
       context.moveTo(x0, y0);
       context.lineTo(x, y);
       context.stroke();
-      const [lx, ly] = shown(times(1.17, axis));
+      const [lx, ly] = shown(axis.clone().multiplyScalar(1.17));
       context.fillText(name, lx, ly);
     }
     context.globalAlpha = 1;
   }
 
   /** The arrow comes from one side of the sphere and leaves at the other, where the handle is. */
-  private draw_arrow(
-    context: CanvasRenderingContext2D,
-    direction: Vector,
-    shown: (v: Vector) => [number, number, number],
-  ): void {
-    const [x0, y0] = shown(times(-1, direction));
+  private draw_arrow(context: CanvasRenderingContext2D, direction: Vector3, shown: Projection): void {
+    const [x0, y0] = shown(direction.clone().negate());
     const [x, y, depth] = shown(direction);
     const color = style_value("--beam");
     context.strokeStyle = context.fillStyle = color;

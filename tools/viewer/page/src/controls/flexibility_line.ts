@@ -1,6 +1,6 @@
 // The flexibility s(λ) = a + b λ: a line over the visible spectrum whose two ends one drags.
 
-import { svg_element, element } from "../elements/dom";
+import { element, on_arrow_keys, on_drag, svg_element } from "../elements/dom";
 import { short_text } from "../elements/numbers";
 import { spectrum_color } from "../elements/spectrum_color";
 import { is_object, value_at } from "../state/json";
@@ -18,7 +18,7 @@ export class FlexibilityLine implements Control {
   private readonly handles: SVGCircleElement[];
   private low = 0;
   private high = 1;
-  private held: number | null = null;
+  private held = false;
 
   /** @param bending  The object that has a and b. */
   constructor(private readonly bending: Key) {
@@ -36,7 +36,7 @@ export class FlexibilityLine implements Control {
   update(): void {
     this.node.hidden = is_object(this.bending.given) && "rgb" in this.bending.given;
     const values = this.values();
-    if (this.held === null) {
+    if (!this.held) {
       // 0 is always visible. The range keeps its place during a drag.
       const [least, greatest] = [Math.min(0, ...values), Math.max(0, ...values)];
       const margin = Math.max(0.25 * (greatest - least), 0.05);
@@ -79,31 +79,20 @@ export class FlexibilityLine implements Control {
   }
 
   private listen(handle: SVGCircleElement, i: number): void {
-    handle.addEventListener("pointerdown", (event) => {
-      handle.setPointerCapture(event.pointerId);
-      this.held = i;
-    });
-    handle.addEventListener("pointermove", (event) => {
-      if (this.held !== i) return;
+    const drag = (_x: number, _y: number, event: PointerEvent): void => {
+      this.held = true;
       const box = this.svg.getBoundingClientRect();
       const y = ((event.clientY - box.top) / box.height) * height;
       const part = Math.min(1, Math.max(0, (bottom - y) / (bottom - top)));
       this.move(i, this.low + part * (this.high - this.low));
-    });
-    const end = (): void => {
-      if (this.held === null) return;
-      this.held = null;
+    };
+    on_drag(handle, drag, () => {
+      this.held = false;
       this.bending.finish(false);
       this.update();
-    };
-    handle.addEventListener("pointerup", end);
-    handle.addEventListener("pointercancel", end);
-    handle.addEventListener("keydown", (event) => {
-      const step = (event.shiftKey ? 0.1 : 1) * 0.01;
-      const sign = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 }[event.key];
-      if (!sign) return;
-      event.preventDefault();
-      this.move(i, this.values()[i]! + sign * step);
+    });
+    on_arrow_keys(handle, (x, y) => {
+      this.move(i, this.values()[i]! + 0.01 * (x - y));
       this.bending.finish(true);
     });
   }

@@ -37,12 +37,54 @@ export function button(text: string, attributes: Attributes, action: () => void)
   return node;
 }
 
+/** Calls `move` for arrow keys, with 1 or −1 along x (to the right) or y (down), or with ± `fine` if shift is held. */
+export function on_arrow_keys(node: HTMLElement | SVGElement, move: (x: number, y: number) => void, fine = 0.1): void {
+  const moves: Record<string, [number, number]> = {
+    ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
+  };
+  (node as HTMLElement).addEventListener("keydown", (event) => {
+    const [x, y] = moves[event.key] ?? [0, 0];
+    if (x === 0 && y === 0) return;
+    event.preventDefault();
+    const step = event.shiftKey ? fine : 1;
+    move(step * x, step * y);
+  });
+}
+
+/** Calls `move` while the pointer drags `node`, with its way since the last call, CSS pixels; then `end`. */
+export function on_drag(
+  node: HTMLElement | SVGElement,
+  move: (x: number, y: number, event: PointerEvent) => void,
+  end: () => void,
+): void {
+  const target = node as HTMLElement;
+  let last: PointerEvent | null = null;
+  target.addEventListener("pointerdown", (event) => {
+    target.setPointerCapture(event.pointerId);
+    last = event;
+  });
+  target.addEventListener("pointermove", (event) => {
+    if (!last) return;
+    const [x, y] = [event.clientX - last.clientX, event.clientY - last.clientY];
+    last = event;
+    move(x, y, event);
+  });
+  for (const name of ["pointerup", "pointercancel"] as const)
+    target.addEventListener(name, () => {
+      if (last) end();
+      last = null;
+    });
+}
+
 /** The element of index.html with this id. */
 export function by_id<T extends HTMLElement = HTMLElement>(id: string): T {
   const node = document.getElementById(id);
   if (!node) throw new Error("index.html has no element " + id);
   return node as T;
 }
+
+/** The colours of the world's axes. */
+export const axis_colors = { x: "#d64545", y: "#3c9a3c", z: "#3d6fe0" };
 
 /** The value of a custom property of view.css, such as --ink. */
 export function style_value(name: string): string {

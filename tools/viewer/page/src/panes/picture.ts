@@ -1,5 +1,6 @@
 // The picture: draws coarse stages at the size of the finished one, and tells where the pointer is.
 
+import { on_arrow_keys } from "../elements/dom";
 import type { PictureHeader } from "../state/protocol";
 
 /** The longest side of the canvas; browsers limit it. */
@@ -26,16 +27,9 @@ export class Picture {
     };
     canvas.addEventListener("pointermove", point);
     canvas.addEventListener("pointerdown", point);
-    canvas.addEventListener("keydown", (event) => {
-      const step = event.shiftKey ? key_step / 10 : key_step;
-      const moves: Record<string, [number, number]> = {
-        ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step],
-      };
-      const move = moves[event.key];
-      if (!move) return;
-      event.preventDefault();
-      const [x, y] = this.mark ?? [0.5, 0.5];
-      this.point(x + move[0], y + move[1]);
+    on_arrow_keys(canvas, (x, y) => {
+      const [x0, y0] = this.mark ?? [0.5, 0.5];
+      this.point(x0 + key_step * x, y0 + key_step * y);
     });
   }
 

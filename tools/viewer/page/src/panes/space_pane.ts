@@ -5,10 +5,9 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { LineMaterial } from "three/examples/jsm/lines/LineMaterial.js";
 import { LineSegments2 } from "three/examples/jsm/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeometry.js";
-import { style_value } from "../elements/dom";
+import { axis_colors, style_value } from "../elements/dom";
 import type { FieldInformation, Mesh, Ray, Space, Vector } from "../state/protocol";
 
-const axis_colors = { x: "#d64545", y: "#3c9a3c", z: "#3d6fe0" };
 const view_from: Vector = [0.9, -1.5, 0.75];
 const margin = 0.08;  // of the pane, about the content
 const click_distance = 4;  // pixels
@@ -217,7 +216,7 @@ export class SpacePane {
         if ((i & bit) === 0 && a && b) edges.push(a, b);
       }
     }
-    this.field_group.add(thin_lines(edges, style_value("--ink-quiet")));
+    this.field_group.add(thin_lines(edges.flat(), style_value("--ink-quiet")));
 
     const origin = new three.Vector3(...(corners[0] ?? [0, 0, 0]));
     const size = this.field_sphere.radius * 0.3;
@@ -238,9 +237,7 @@ export class SpacePane {
     if (space.plate?.length === 4) this.add_plate(space.plate);
     if (space.beam) this.add_beam(space.beam);
     for (const mesh of this.meshes) {
-      const geometry = new three.BufferGeometry();
-      geometry.setAttribute("position", new three.Float32BufferAttribute(mesh.positions, 3));
-      geometry.setIndex(mesh.triangles);
+      const geometry = surface(mesh.positions, mesh.triangles);
       geometry.computeVertexNormals();
       const limits = /body|bounds/i.test(mesh.name);
       const material = new three.MeshStandardMaterial({
@@ -253,22 +250,23 @@ export class SpacePane {
       });
       this.space_group.add(new three.Mesh(geometry, material));
     }
-    if (space.rays.length > 0 && this.rays_shown) this.space_group.add(many_rays(space.rays));
+    if (space.rays.length > 0 && this.rays_shown) {
+      const { positions, colors } = pieces_of(space.rays);
+      this.space_group.add(thin_lines(positions, colors));
+    }
     if (space.camera) this.add_camera(space.camera);
   }
 
   private add_plate(corners: Vector[]): void {
-    const geometry = new three.BufferGeometry();
-    geometry.setAttribute("position", new three.Float32BufferAttribute(corners.flat(), 3));
+    const geometry = surface(corners.flat(), [0, 1, 2, 0, 2, 3]);
     geometry.setAttribute("uv", new three.Float32BufferAttribute([0, 0, 1, 0, 1, 1, 0, 1], 2));
-    geometry.setIndex([0, 1, 2, 0, 2, 3]);
     const material = this.shows_picture
       ? new three.MeshBasicMaterial({ map: this.texture, side: three.DoubleSide, toneMapped: false })
       : new three.MeshBasicMaterial({ color: "#888888", side: three.DoubleSide, transparent: true, opacity: 0.3 });
     const mesh = new three.Mesh(geometry, material);
     if (this.shows_picture) this.plate = mesh;
     const outline = [0, 1, 1, 2, 2, 3, 3, 0].flatMap((i): Vector[] => (corners[i] ? [corners[i]] : []));
-    this.space_group.add(mesh, thin_lines(outline, style_value("--ink-quiet")));
+    this.space_group.add(mesh, thin_lines(outline.flat(), style_value("--ink-quiet")));
   }
 
   private add_beam(beam: NonNullable<Space["beam"]>): void {
@@ -279,7 +277,7 @@ export class SpacePane {
     const arrow = new three.ArrowHelper(direction, origin, size, color, size * 0.28, size * 0.16);
     const circle = circle_of(beam);
     const lines = circle.flatMap((point, i): Vector[] => [point, circle[(i + 1) % circle.length]!]);
-    this.space_group.add(arrow, thin_lines(lines, color));
+    this.space_group.add(arrow, thin_lines(lines.flat(), color));
   }
 
   private add_camera(view: NonNullable<Space["camera"]>): void {
@@ -298,7 +296,7 @@ export class SpacePane {
         .toArray();
     const ring = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
     const lines = ring.flatMap((point, i): Vector[] => [eye.toArray(), point, point, ring[(i + 1) % 4]!]);
-    this.space_group.add(thin_lines(lines, style_value("--accent")));
+    this.space_group.add(thin_lines(lines.flat(), style_value("--accent")));
   }
 }
 
@@ -340,10 +338,21 @@ function clear(group: three.Group): void {
   }
 }
 
-function thin_lines(ends: Vector[], color: string): three.LineSegments {
+/** Lines between pairs of points, in one colour, or in one for each point. */
+function thin_lines(ends: number[], color: string | number[]): three.LineSegments {
   const geometry = new three.BufferGeometry();
-  geometry.setAttribute("position", new three.Float32BufferAttribute(ends.flat(), 3));
-  return new three.LineSegments(geometry, new three.LineBasicMaterial({ color }));
+  geometry.setAttribute("position", new three.Float32BufferAttribute(ends, 3));
+  if (typeof color === "string") return new three.LineSegments(geometry, new three.LineBasicMaterial({ color }));
+  geometry.setAttribute("color", new three.Float32BufferAttribute(color, 3));
+  const material = new three.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.8 });
+  return new three.LineSegments(geometry, material);
+}
+
+function surface(positions: number[], triangles: number[]): three.BufferGeometry {
+  const geometry = new three.BufferGeometry();
+  geometry.setAttribute("position", new three.Float32BufferAttribute(positions, 3));
+  geometry.setIndex(triangles);
+  return geometry;
 }
 
 /** Positions and colours of the rays' pieces, for lines. */
@@ -358,17 +367,6 @@ function pieces_of(rays: Ray[]): { positions: number[]; colors: number[] } {
     }
   }
   return { positions, colors };
-}
-
-function many_rays(rays: Ray[]): three.LineSegments {
-  const { positions, colors } = pieces_of(rays);
-  const geometry = new three.BufferGeometry();
-  geometry.setAttribute("position", new three.Float32BufferAttribute(positions, 3));
-  geometry.setAttribute("color", new three.Float32BufferAttribute(colors, 3));
-  return new three.LineSegments(
-    geometry,
-    new three.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.8 }),
-  );
 }
 
 /** Lines of `width` pixels; in the colours of the rays, or in `color`. */

@@ -44,20 +44,11 @@ export function with_value(root: JsonObject, path: Path, value: Json): JsonObjec
 export function without_value(root: JsonObject, path: Path): JsonObject {
   const [key, ...rest] = path;
   if (key === undefined || !(key in root)) return root;
-  const copy = { ...root };
-  const child = copy[key];
-  if (rest.length > 0 && is_object(child)) {
-    const remaining = without_value(child, rest);
-    if (remaining === child) return root;
-    if (Object.keys(remaining).length > 0) {
-      copy[key] = remaining;
-      return copy;
-    }
-  } else if (rest.length > 0) {
-    return root;
-  }
-  delete copy[key];
-  return copy;
+  const { [key]: child, ...others } = root;
+  if (rest.length === 0) return others;
+  if (!is_object(child)) return root;
+  const remaining = without_value(child, rest);
+  return Object.keys(remaining).length > 0 ? { ...root, [key]: remaining } : others;
 }
 
 /** The merge patch that makes `to` of `from`. Scenes contain no null, so it is exact. */
