@@ -23,26 +23,17 @@ std::string bytes_of(const std::filesystem::path& file) {
 
 class Replay : public ::testing::TestWithParam<std::size_t> {};
 
-TEST_P(Replay, NoBytesBreakAParser) {
+/// A fuzzer that has no accepted bytes to begin with sees little of its parser.
+TEST_P(Replay, NoBytesBreakAParserWhichAcceptsSomeOfThem) {
   const FuzzTarget& target = fuzz_targets()[GetParam()];
-  std::size_t files = 0;
+  std::size_t accepted = 0;
   for (const auto& entry : std::filesystem::directory_iterator(corpus() / target.name)) {
     const std::string bytes = bytes_of(entry.path());
-    ++files;
-    EXPECT_NO_THROW(target.read(bytes)) << entry.path();
+    EXPECT_NO_THROW(accepted += target.read(bytes) ? 1 : 0) << entry.path();
     constexpr std::size_t cuts = 64;
     for (std::size_t i = 0; i < cuts; ++i)
       EXPECT_NO_THROW(target.read(bytes.substr(0, bytes.size() * i / cuts))) << entry.path() << " " << i;
   }
-  EXPECT_GT(files, 0u) << target.name;
-}
-
-/// A fuzzer that has no accepted bytes to begin with sees little of its parser.
-TEST_P(Replay, AParserAcceptsSomeOfItsBytes) {
-  const FuzzTarget& target = fuzz_targets()[GetParam()];
-  std::size_t accepted = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(corpus() / target.name))
-    if (target.read(bytes_of(entry.path()))) ++accepted;
   EXPECT_GT(accepted, 0u) << target.name;
 }
 

@@ -3,13 +3,11 @@
 #include <cstdint>
 #include <fstream>
 #include <new>
-#include <optional>
 #include <sstream>
 #include <stdexcept>
 
 #include <fcntl.h>
 #include <sys/mman.h>
-#include <vtkXMLDataElement.h>
 
 #include "base/files/descriptor.h"
 #include "base/files/temporary_folder.h"
@@ -76,16 +74,16 @@ std::filesystem::path named(const std::filesystem::path& path, const std::string
   return link;
 }
 
-template <class Read>
-bool read_file(const std::string& bytes, const Read& read) {
+/// A target of the bytes of a file.
+template <void (*read)(const std::filesystem::path&)>
+bool of_file(const std::string& bytes) {
   const MemoryFile file(bytes);
   return expect_one_line([&] { read(file.path()); });
 }
 
-bool read_scene_file(const std::string& bytes) {
-  return read_file(bytes,
-                   [](const std::filesystem::path& path) { read_scene_json(read_json_object(path), "scene.json"); });
-}
+using Path = std::filesystem::path;
+
+void read_scene_file(const Path& path) { read_scene_json(read_json_object(path), "scene.json"); }
 
 /// Lines of KEY=VALUE.
 bool read_overrides(const std::string& bytes) {
@@ -103,14 +101,15 @@ bool read_frames(const std::string& bytes) {
   return expect_one_line([&] { parse_frames(bytes); });
 }
 
+void read_seed_file(const Path& path) { read_seeds(path); }
+void read_spectrum_file(const Path& path) { read_spectrum(path); }
+
 bool read_seeds_and_spectrum(const std::string& bytes) {
-  const bool are_seeds = read_file(bytes, [](const std::filesystem::path& path) { read_seeds(path); });
-  return read_file(bytes, [](const std::filesystem::path& path) { read_spectrum(path); }) || are_seeds;
+  const bool are_seeds = of_file<read_seed_file>(bytes);
+  return of_file<read_spectrum_file>(bytes) || are_seeds;
 }
 
-bool read_kept_work(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) { read_work(path); });
-}
+void read_kept_work(const Path& path) { read_work(path); }
 
 /// What files of work hold: the sums of photons, or other results. Their first byte chooses. (Few of the bytes that a
 /// fuzzer makes of such a file have the right hash.)
@@ -139,13 +138,8 @@ void require_whole(const MeshWithNormals& mesh) {
       if (vertex >= count) throw std::logic_error("a vertex is missing");
 }
 
-bool read_ply_mesh(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) { require_whole(read_ply(path)); });
-}
-
-bool read_obj_mesh(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) { require_whole(read_obj(path)); });
-}
+void read_ply_mesh(const Path& path) { require_whole(read_ply(path)); }
+void read_obj_mesh(const Path& path) { require_whole(read_obj(path)); }
 
 /// For grey pictures, too.
 bool read_profile(const std::string& bytes) {
@@ -153,56 +147,40 @@ bool read_profile(const std::string& bytes) {
   return expect_one_line([&] { icc_to_xyz(bytes, false); }) || is_grey;
 }
 
-bool read_png_chunks(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) { tensorray::read_png_chunks(path); });
-}
-
-bool read_tck(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) { read_tck_paths(path); });
-}
+void read_png(const Path& path) { read_png_chunks(path); }
+void read_tck(const Path& path) { read_tck_paths(path); }
 
 /// The values of all slices, too.
-bool read_lattice(const std::string& bytes, Lattice (*open)(const std::filesystem::path&)) {
-  return read_file(bytes, [open](const std::filesystem::path& path) {
-    const Lattice lattice = open(path);
-    std::vector<double> values(static_cast<std::size_t>(lattice.size.x()) * static_cast<std::size_t>(lattice.size.y()) *
-                               static_cast<std::size_t>(lattice.components));
-    for (int z = lattice.size.z() - 1; z >= 0; --z) lattice.read_slice(z, values.data());
-  });
+void read_slices(const Lattice& lattice) {
+  std::vector<double> values(static_cast<std::size_t>(lattice.size.x()) * static_cast<std::size_t>(lattice.size.y()) *
+                             static_cast<std::size_t>(lattice.components));
+  for (int z = lattice.size.z() - 1; z >= 0; --z) lattice.read_slice(z, values.data());
 }
 
-bool read_npy(const std::string& bytes) { return read_lattice(bytes, open_npy); }
-bool read_nrrd(const std::string& bytes) { return read_lattice(bytes, open_nrrd); }
-bool read_nifti(const std::string& bytes) {  // The library reads only files with this ending.
-  return read_lattice(bytes, [](const std::filesystem::path& path) { return open_nifti(named(path, "fuzz.nii")); });
+template <Lattice (*open)(const Path&)>
+void read_lattice(const Path& path) {
+  read_slices(open(path));
 }
-bool read_mrtrix(const std::string& bytes) { return read_lattice(bytes, open_mrtrix); }
-bool read_metaimage(const std::string& bytes) { return read_lattice(bytes, open_metaimage); }
+
+/// The library reads only files with this ending.
+void read_nifti(const Path& path) { read_slices(open_nifti(named(path, "fuzz.nii"))); }
 
 /// All numbers that stand in the document itself.
-bool read_xdmf(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) {
-    const VtkMessages messages;
-    const XdmfDocument document(path);
-    for (int step = 0; step < document.steps(); ++step)
-      for (vtkXMLDataElement* const grid : document.grids(step))
-        for (vtkXMLDataElement* const part : document.children(*grid, {"Topology", "Geometry", "Attribute"}))
-          for (vtkXMLDataElement* const item : document.children(*part, {"DataItem"})) xdmf_values(document, *item);
-  });
+void read_xdmf(const Path& path) {
+  const VtkMessages messages;
+  const XdmfDocument document(path);
+  for (int step = 0; step < document.steps(); ++step)
+    for (XmlElement* const grid : document.grids(step))
+      for (XmlElement* const part : document.children(*grid, {"Topology", "Geometry", "Attribute"}))
+        for (XmlElement* const item : document.children(*part, {"DataItem"})) xdmf_values(document, *item);
 }
 
 /// Beside the case there are files that it may name.
-bool read_ensight(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) {
-    const std::filesystem::path file = named(path, "fuzz.case");
-    for (const char* other : {"a.0.geo", "a.0.sym", "a.0.gen", "a.1.geo"}) std::ofstream(file.parent_path() / other);
-    expect_one_line([&] { ensight_case(file, 1); });
-    ensight_case(file, std::nullopt);
-  });
-}
-
-bool read_netcdf(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) { require_whole_netcdf(path); });
+void read_ensight(const Path& path) {
+  const Path file = named(path, "fuzz.case");
+  for (const char* other : {"a.0.geo", "a.0.sym", "a.0.gen", "a.1.geo"}) std::ofstream(file.parent_path() / other);
+  expect_one_line([&] { ensight_case(file, 1); });
+  ensight_case(file, 0);
 }
 
 /// The first byte chooses how the file stores its tree.
@@ -221,17 +199,28 @@ bool read_vdb_tree(const std::string& bytes) {
 }  // namespace
 
 const std::vector<FuzzTarget>& fuzz_targets() {
-  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file}, {"override", read_overrides},
-                                               {"frames", read_frames},    {"text", read_seeds_and_spectrum},
-                                               {"work", read_kept_work},   {"kept", read_kept_unit},
-                                               {"ply", read_ply_mesh},     {"obj", read_obj_mesh},
-                                               {"icc", read_profile},      {"png", read_png_chunks},
-                                               {"tck", read_tck},          {"npy", read_npy},
-                                               {"nrrd", read_nrrd},        {"nifti", read_nifti},
-                                               {"mrtrix", read_mrtrix},    {"metaimage", read_metaimage},
-                                               {"xdmf", read_xdmf},        {"ensight", read_ensight},
-                                               {"netcdf", read_netcdf},    {"vdb_tree", read_vdb_tree},
-                                               {"http", read_http},        {"page", read_page_message}};
+  static const std::vector<FuzzTarget> targets{{"scene", of_file<read_scene_file>},
+                                               {"override", read_overrides},
+                                               {"frames", read_frames},
+                                               {"text", read_seeds_and_spectrum},
+                                               {"work", of_file<read_kept_work>},
+                                               {"kept", read_kept_unit},
+                                               {"ply", of_file<read_ply_mesh>},
+                                               {"obj", of_file<read_obj_mesh>},
+                                               {"icc", read_profile},
+                                               {"png", of_file<read_png>},
+                                               {"tck", of_file<read_tck>},
+                                               {"npy", of_file<read_lattice<open_npy>>},
+                                               {"nrrd", of_file<read_lattice<open_nrrd>>},
+                                               {"nifti", of_file<read_nifti>},
+                                               {"mrtrix", of_file<read_lattice<open_mrtrix>>},
+                                               {"metaimage", of_file<read_lattice<open_metaimage>>},
+                                               {"xdmf", of_file<read_xdmf>},
+                                               {"ensight", of_file<read_ensight>},
+                                               {"netcdf", of_file<require_whole_netcdf>},
+                                               {"vdb_tree", read_vdb_tree},
+                                               {"http", read_http},
+                                               {"page", read_page_message}};
   return targets;
 }
 

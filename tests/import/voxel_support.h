@@ -2,14 +2,13 @@
 /// @file tests/import/voxel_support.h
 /// Temporary files of voxels, the data sets, and checks of the results.
 
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Eigenvalues>
@@ -50,9 +49,9 @@ inline const Eigen::Matrix3f* voxel(const TensorGrid& grid, const Eigen::Vector3
   return nullptr;
 }
 
-inline TensorGrid tensors_of(const Lattice& lattice, const std::string& order = "") {
+inline TensorGrid tensors_of(const Lattice& lattice, std::optional<TensorOrder> order = {}) {
   LatticeReport report;
-  return tensors_of(lattice, order.empty() ? std::nullopt : std::optional(tensor_order_of(order)), report);
+  return tensors_of(lattice, order, report);
 }
 
 /// Calls `visit(index, tensor)` at the active voxels.
@@ -64,50 +63,14 @@ inline void for_each_voxel(const TensorGrid& grid,
         visit(block.origin + TensorBlock::position(offset), block.values[offset].cast<double>());
 }
 
-/// The least and the greatest eigenvalue of a symmetric field, and the number of voxels with a negative eigenvalue.
-struct Spectrum {
-  double least = INFINITY, greatest = -INFINITY;
-  int negative = 0;
-};
-
-inline Spectrum spectrum_of(const TensorGrid& grid) {
-  Spectrum spectrum;
+/// The least and the greatest eigenvalue of a symmetric field.
+inline std::pair<double, double> eigenvalues_of(const TensorGrid& grid) {
+  std::pair<double, double> range{INFINITY, -INFINITY};
   for_each_voxel(grid, [&](const Eigen::Vector3i&, const Eigen::Matrix3d& tensor) {
     const Eigen::Vector3d values = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(tensor).eigenvalues();
-    spectrum.least = std::min(spectrum.least, values.minCoeff());
-    spectrum.greatest = std::max(spectrum.greatest, values.maxCoeff());
-    if (values.minCoeff() < 0) ++spectrum.negative;
+    range = {std::min(range.first, values.minCoeff()), std::max(range.second, values.maxCoeff())};
   });
-  return spectrum;
-}
-
-/// Counts how often fibres continue. At each voxel p with a fractional anisotropy above 0.5, the major eigenvector e,
-/// rotated by `turn`, is compared with the major eigenvectors of such voxels at p ± step e; it counts if they differ
-/// by less than half a radian. Tensors in a wrong frame have a lower count, because their fibres point out of the
-/// bundles.
-inline int coherence(const TensorGrid& grid, const Eigen::Matrix3d& turn, double step) {
-  const auto major = [&](const Eigen::Matrix3d& tensor) -> Eigen::Vector3d {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tensor);
-    const Eigen::Vector3d values = solver.eigenvalues();
-    const double anisotropy = std::sqrt(1.5) * (values.array() - values.mean()).matrix().norm() / values.norm();
-    if (values[0] <= 0 || anisotropy < 0.5) return Eigen::Vector3d::Zero();
-    return turn * solver.eigenvectors().col(2);
-  };
-  std::map<std::array<int, 3>, Eigen::Vector3d> directions;
-  for_each_voxel(grid, [&](const Eigen::Vector3i& index, const Eigen::Matrix3d& tensor) {
-    const Eigen::Vector3d direction = major(tensor);
-    if (!direction.isZero()) directions[{index.x(), index.y(), index.z()}] = direction;
-  });
-  const Eigen::Affine3d to_index = grid.to_world.inverse();
-  int count = 0;
-  for (const auto& [index, here] : directions)
-    for (const double side : {-step, step}) {
-      const Eigen::Vector3d from = grid.to_world * Eigen::Vector3d(index[0], index[1], index[2]);
-      const Eigen::Vector3i to = (to_index * (from + side * here)).array().round().cast<int>();
-      const auto next = directions.find({to.x(), to.y(), to.z()});
-      if (next != directions.end() && std::abs(here.dot(next->second)) > std::cos(0.5)) ++count;
-    }
-  return count;
+  return range;
 }
 
 /// Expects an exception of any type with a one-line message that contains `words`.
@@ -127,7 +90,7 @@ inline void refuses(Lattice (*open)(const std::filesystem::path&), const std::st
                     std::vector<std::string> words = {}) {
   const TemporaryFile file(name, bytes);
   words.insert(words.begin(), name);
-  expect_error([&] { tensors_of(open(file), "fsl"); }, words);
+  expect_error([&] { tensors_of(open(file), TensorOrder::fsl); }, words);
 }
 
 /// A rotation without any symmetry.

@@ -49,9 +49,8 @@ OpenLattice lattice_reader(const std::filesystem::path& path) {
   return ends_with(name, ".npy") ? open_npy : nullptr;
 }
 
-bool wants_sampling(const ImportSettings& settings) {
-  return !std::holds_alternative<std::monostate>(settings.sampling.resolution);
-}
+/// Whether the user asks for voxels of a size or a number; the first kind of a resolution is none.
+bool wants_sampling(const ImportSettings& settings) { return settings.sampling.resolution.index() > 0; }
 
 /// Keeps only the voxels whose centres are in `bounds`, except for rounding.
 void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {

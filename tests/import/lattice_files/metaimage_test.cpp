@@ -64,33 +64,6 @@ TEST(MetaImage, ComponentsAndWorldAreOfLps) {
   EXPECT_LT((lattice.to_world.linear() - flip * turn * Vector3d(2, 3, 4).asDiagonal()).norm(), 1e-5);
 }
 
-TEST(MetaImage, TheUserGivesAnotherFrameOrOrder) {
-  const test::TemporaryFile file("a.mha", header_of(6, {1, 1, 1}, "TransformMatrix = 1 0 0 0 -1 0 0 0 1\n") +
-                                              test::bytes_of(upper_triangle(test::symmetric_tensor())));
-  Lattice lattice = open_metaimage(file);
-  take_frame(lattice, ComponentFrame::voxels);
-  const Matrix3d axes = Vector3d(-1, 1, 1).asDiagonal();
-  test::expect_near(axes * test::symmetric_tensor() * axes, test::voxel(test::tensors_of(lattice), {0, 0, 0}));
-  take_frame(lattice, ComponentFrame::ras);
-  const Matrix3d t = test::symmetric_tensor();
-  const Matrix3d lower =
-      (Matrix3d() << t(0, 0), t(0, 1), t(1, 1), t(0, 1), t(0, 2), t(1, 2), t(1, 1), t(1, 2), t(2, 2)).finished();
-  test::expect_near(lower, test::voxel(test::tensors_of(lattice, "lower"), {0, 0, 0}));
-}
-
-TEST(MetaImage, VectorsAreDifferentiated) {
-  std::vector<float> numbers;
-  for (int z = 0; z < 3; ++z)
-    for (int y = 0; y < 3; ++y)
-      for (int x = 0; x < 3; ++x)
-        numbers.insert(numbers.end(), {2 * static_cast<float>(y), 0, 3 * static_cast<float>(x)});
-  const test::TemporaryFile file("a.mha", header_of(3, {3, 3, 3}) + test::bytes_of(numbers));
-  LatticeReport report;
-  const TensorGrid grid = gradient_of(open_metaimage(file), report);
-  const Matrix3d in_lps = (Matrix3d() << 0, 2, 0, 0, 0, 0, 3, 0, 0).finished();
-  test::expect_near(flip * in_lps * flip, test::voxel(grid, {1, 1, 1}));
-}
-
 TEST(MetaImage, EveryPlaceOfTheNumbers) {
   const std::string bytes = test::bytes_of(two_voxels());
   std::string swapped = bytes, doubles;
@@ -125,7 +98,11 @@ TEST(MetaImage, DamageAndOtherKindsAreErrorsWithTheFile) {
   expect(header_of(6, {0, 1, 1}) + bytes, "DimSize");
   expect(header_of(5, {2, 1, 1}) + bytes, "5 channels");
   expect(header_of(6, {2, 1, 1}, "NDims = 2\n") + bytes, "NDims");
-  expect(header_of(6, {2, 1, 1}, "BinaryData = False\n") + bytes, "text");
+  expect(
+      "NDims = 3\nDimSize = 2 1 1\nElementNumberOfChannels = 6\nElementType = MET_FLOAT\nBinaryData = False\n"
+      "ElementDataFile = LOCAL\n" +
+          bytes,
+      "text");
   expect(header_of(6, {2, 1, 1}, "TransformMatrix = 1 0 0 1 0 0 0 0 1\n") + bytes, "inverted");
   expect(header_of(6, {2, 1, 1}, "ElementSpacing = 1 x 1\n") + bytes, "ElementSpacing");
   expect(header_of(6, {2, 1, 1}, "", "MET_OTHER") + bytes, "MET_OTHER");

@@ -96,7 +96,7 @@ TEST(Mrtrix, TheUserGivesAnotherOrderWithItsAxes) {
       "a.mif", file_of("+0,+1,+2,+3", "Float32LE", 6, "transform: -1,0,0,0\ntransform: 0,1,0,0\ntransform: 0,0,1,0\n"));
   const auto v = [](int c) { return value_at({1, 1, 1}, c); };
   const Matrix3d fsl = (Matrix3d() << v(0), -v(1), -v(2), -v(1), v(3), v(4), -v(2), v(4), v(5)).finished();
-  test::expect_near(fsl, test::voxel(test::tensors_of(open_mrtrix(file), "fsl"), {1, 1, 1}));
+  test::expect_near(fsl, test::voxel(test::tensors_of(open_mrtrix(file), TensorOrder::fsl), {1, 1, 1}));
 }
 
 TEST(Mrtrix, HeadersWithAFileOfNumbers) {

@@ -1,11 +1,8 @@
 #include <algorithm>
 #include <array>
-#include <random>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
 
 #include "tests/import/voxel_support.h"
 #include "tools/import/lattice_files/lattice_files.h"
@@ -74,44 +71,32 @@ const Vector3i size(4, 3, 19);
 const std::vector<std::size_t> shape = {19, 3, 4, 3, 3};
 
 TEST(Npy, EveryPrecisionByteOrderAndArrangementIsRead) {
-  for (const bool fortran : {false, true}) {
-    const test::TemporaryFile file("field.npy");
-    const auto as_float = [](double value) { return static_cast<float>(value); };
-    file.write(header_of("<f4", fortran, shape) + numbers_of<float>(size, fortran, as_float));
-    expect_field(file, size);
-    file.write(header_of(">f4", fortran, shape, 2) +
-               numbers_of<float>(size, fortran, [&](double value) { return swapped(as_float(value)); }));
-    expect_field(file, size);
-    file.write(header_of("<f8", fortran, shape, 3) + numbers_of<double>(size, fortran, [](double v) { return v; }));
-    expect_field(file, size);
-    file.write(header_of(">f8", fortran, shape) + numbers_of<double>(size, fortran, swapped<double>));
-    expect_field(file, size);
-  }
-}
-
-TEST(Npy, HalfPrecisionIsRead) {
-  const auto half = [](double value) {
-    const Eigen::half number(static_cast<float>(value));
-    std::uint16_t bits;
-    std::memcpy(&bits, &number, 2);
-    return bits;
-  };
-  // The numbers need at most eleven bits: 1.5 in half precision is 0x3e00.
+  const auto as_float = [](double value) { return static_cast<float>(value); };
+  const auto half = [](double value) { return Eigen::half(static_cast<float>(value)).x; };
   ASSERT_EQ(half(1.5), 0x3e00);
-  const Vector3i small(4, 2, 2);
-  const test::TemporaryFile file("half.npy");
-  file.write(header_of("<f2", false, {2, 2, 4, 3, 3}) + numbers_of<std::uint16_t>(small, false, half));
-  expect_field(file, small);
-  file.write(header_of(">f2", true, {2, 2, 4, 3, 3}) +
-             numbers_of<std::uint16_t>(small, true, [&](double value) { return swapped(half(value)); }));
-  expect_field(file, small);
+  const Vector3i small(4, 2, 2);  // Its numbers have at most the eleven bits of half precision.
+  for (const bool fortran : {false, true}) {
+    const auto expect = [&](const std::string& bytes, const Vector3i& of_size) {
+      expect_field(test::TemporaryFile("field.npy", bytes), of_size);
+    };
+    expect(header_of("<f4", fortran, shape) + numbers_of<float>(size, fortran, as_float), size);
+    expect(header_of(">f4", fortran, shape, 2) +
+               numbers_of<float>(size, fortran, [&](double value) { return swapped(as_float(value)); }),
+           size);
+    expect(header_of("<f8", fortran, shape, 3) + numbers_of<double>(size, fortran, [](double v) { return v; }), size);
+    expect(header_of(">f8", fortran, shape) + numbers_of<double>(size, fortran, swapped<double>), size);
+    expect(header_of("<f2", fortran, {2, 2, 4, 3, 3}) + numbers_of<std::uint16_t>(small, fortran, half), small);
+    expect(header_of(">f2", fortran, {2, 2, 4, 3, 3}) +
+               numbers_of<std::uint16_t>(small, fortran, [&](double value) { return swapped(half(value)); }),
+           small);
+  }
 }
 
 TEST(Npy, SixAskForTheirOrderAndThreeAreAVector) {
   const std::vector<double> six = {11, 22, 33, 23, 13, 12};
   const test::TemporaryFile file("six.npy", header_of("<f8", false, {1, 1, 1, 6}) + test::bytes_of(six));
   test::expect_error([&] { test::tensors_of(open_npy(file)); }, {"--order"});
-  const TensorGrid grid = test::tensors_of(open_npy(file), "voigt");
+  const TensorGrid grid = test::tensors_of(open_npy(file), TensorOrder::voigt);
   test::expect_near((Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished(), test::voxel(grid, {0, 0, 0}));
 
   const std::vector<double> vectors = {0, 0, 0, 5, 0, 0};  // v = (5 y, 0, 0)
@@ -145,36 +130,6 @@ TEST(Npy, WrongFilesAreErrorsOfOneLine) {
   expect(header("|O", {2, 2, 2, 3, 3}) + numbers, {"astype"});
   expect(header("<f4", {2147483647, 2147483647, 2147483647, 3, 3}) + numbers, {"cut off"});
   expect(header("<f4", {99999999999, 2, 2, 3, 3}) + numbers, {"damaged"});
-}
-
-/// What is read of a file need not stay in memory: an import takes little more than its result.
-TEST(Npy, AnImportTakesLittleMoreMemoryThanItsNumbers) {
-#ifdef TENSORRAY_SANITIZED
-  GTEST_SKIP() << "the sanitizer's own memory is larger";
-#endif
-  constexpr std::size_t n = 96, data = n * n * n * 9 * 4;
-  for (const bool fortran : {false, true}) {
-    const test::TemporaryFile file("large.npy", header_of("<f4", fortran, {n, n, n, 3, 3}));
-    std::filesystem::resize_file(file, std::filesystem::file_size(file) + data);
-    const pid_t child = fork();
-    if (child == 0) {
-      std::ifstream statm("/proc/self/statm");
-      std::size_t pages[6] = {};
-      for (std::size_t& one : pages) statm >> one;
-      rlimit limit{};  // Of what only this process has: data and stack.
-      getrlimit(RLIMIT_DATA, &limit);
-      limit.rlim_cur = pages[5] * 4096 + data * 14 / 10;
-      setrlimit(RLIMIT_DATA, &limit);
-      try {
-        _exit(test::tensors_of(open_npy(file)).blocks.empty() ? 1 : 0);
-      } catch (const std::bad_alloc&) {
-        _exit(2);
-      }
-    }
-    int status = 0;
-    waitpid(child, &status, 0);
-    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << fortran;
-  }
 }
 
 }  // namespace

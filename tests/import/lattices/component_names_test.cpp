@@ -146,30 +146,6 @@ TEST(ComponentNames, VariablesOfExodusKeepTheirNames) {
   refuses(nine, "stress_x:3,stress_y,stress_z", {}, "no array \"stress_x:3\"");
 }
 
-/// The symmetric tensor `expected` in Voigt's order, at the points of a data set.
-void add_voigt(vtkDataSet& set, bool named) {
-  add_array<6>(set, "S",
-               [](const Vector3d&) { return (Eigen::Matrix<double, 6, 1>() << 1, 2, 3, 0.4, 0.3, 0.2).finished(); });
-  const char* const names[] = {"XX", "YY", "ZZ", "YZ", "XZ", "XY"};
-  for (int i = 0; named && i < 6; ++i) set.GetPointData()->GetArray("S")->SetComponentName(i, names[i]);
-}
-
-TEST(ComponentNames, AllKindsOfFilesObeyThem) {
-  const TemporaryFolder folder;
-  for (const auto& [ending, set] : data_sets()) {
-    const std::filesystem::path file = folder / ("a" + ending);
-    add_voigt(*set, true);
-    write_xml(*set, file);
-    expect_tensor(file, "S");
-    expect_tensor(file, "S", TensorOrder::voigt);
-    refuses(file, "S", TensorOrder::vtk, "leave --order out");
-    add_voigt(*set, false);
-    write_xml(*set, file);
-    refuses(file, "S", {}, "give it with --order");
-    refuses(file, "tensor", TensorOrder::vtk, "leave --order out");
-  }
-}
-
 TEST(ComponentNames, SymmetricTensorsOfVtkHaveItsOrder) {
   const TemporaryFolder folder;
   const auto set = bar(0, 3);

@@ -82,13 +82,16 @@ TEST(Lattice, TheFrameForFslIsThatOfItsOrderAlone) {
   const Matrix3d turn = test::rotation();
   const auto lattice = [&] {
     Lattice six = lattice_of({1, 1, 1}, [](const Vector3i&) { return std::vector<double>{1.5, 0.75, 2, 0, 0, 0}; });
-    six.fsl_frame = turn;
+    six.to_world.linear() = turn * Vector3d(-1, 1, 1).asDiagonal();
+    six.order_tells_frame = true;
     return six;
   };
-  const Matrix3d fsl = (Matrix3d() << 1.5, 0.75, 2, 0.75, 0, 0, 2, 0, 0).finished();
-  const TensorGrid of_fsl = test::tensors_of(lattice(), "fsl"), of_mrtrix = test::tensors_of(lattice(), "mrtrix");
-  test::expect_near(turn * fsl * turn.transpose(), test::voxel(of_fsl, {0, 0, 0}));
-  test::expect_near(Vector3d(1.5, 0.75, 2).asDiagonal(), test::voxel(of_mrtrix, {0, 0, 0}));
+  const Matrix3d fsl = (Matrix3d() << 1.5, 0.75, 2, 0.75, 0, 0, 2, 0, 0).finished(),
+                 frame = lattice().to_world.linear();
+  test::expect_near(frame * fsl * frame.transpose(),
+                    test::voxel(test::tensors_of(lattice(), TensorOrder::fsl), {0, 0, 0}), 1e-5);
+  test::expect_near(Vector3d(1.5, 0.75, 2).asDiagonal(),
+                    test::voxel(test::tensors_of(lattice(), TensorOrder::mrtrix), {0, 0, 0}));
 }
 
 TEST(Lattice, SymmetricTensorsStaySymmetricWhenTurned) {
@@ -96,7 +99,7 @@ TEST(Lattice, SymmetricTensorsStaySymmetricWhenTurned) {
     return {std::sin(i.x() + 0.1), std::sin(i.y() + 0.2), 0.3 * i.z(), std::cos(i.x() * 1.0), 1.0 * i.y(), 0.7};
   });
   lattice.frame = test::rotation();
-  test::for_each_voxel(test::tensors_of(lattice, "voigt"),
+  test::for_each_voxel(test::tensors_of(lattice, TensorOrder::voigt),
                        [](const Vector3i&, const Matrix3d& tensor) { EXPECT_EQ(tensor, tensor.transpose()); });
 }
 
@@ -129,7 +132,7 @@ TEST(Lattice, MaskedZeroAndNonFiniteVoxelsAreInactive) {
 TEST(Lattice, OfMoreThanNineComponentsTheFirstSixAreTheTensor) {
   const Lattice lattice = lattice_of(
       {1, 1, 1}, [](const Vector3i&) { return std::vector<double>{11, 22, 33, 12, 23, 13, 99, NAN, 99, 99}; });
-  const TensorGrid grid = test::tensors_of(lattice, "vtk");
+  const TensorGrid grid = test::tensors_of(lattice, TensorOrder::vtk);
   test::expect_near((Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished(), test::voxel(grid, {0, 0, 0}));
 }
 

@@ -1,8 +1,6 @@
 #include "tools/import/lattices/tensor_order.h"
 
-#include <stdexcept>
-
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 namespace tensorray {
 namespace {
@@ -31,21 +29,6 @@ TEST(TensorOrder, EachOrderPutsComponentsInTheirPlaces) {
   EXPECT_EQ(tensor_of(plane, TensorOrder::plane), expected);
   expected << 11, 12, 0, 21, 22, 0, 0, 0, 0;
   EXPECT_EQ(tensor_of(two_by_two, TensorOrder::two_by_two), expected);
-}
-
-TEST(TensorOrder, NamesAreThoseOfTheirOrders) {
-  for (const auto& [name, order] : {std::pair("vtk", TensorOrder::vtk),
-                                    {"fsl", TensorOrder::fsl},
-                                    {"mrtrix", TensorOrder::mrtrix},
-                                    {"voigt", TensorOrder::voigt},
-                                    {"lower", TensorOrder::lower_triangle},
-                                    {"plane", TensorOrder::plane},
-                                    {"2x2", TensorOrder::two_by_two}})
-    EXPECT_EQ(tensor_order_of(name), order);
-  for (const std::string name : {"abaqus", "", "VTK"})
-    EXPECT_THAT([&] { tensor_order_of(name); },
-                testing::ThrowsMessage<std::invalid_argument>(
-                    "--order: unknown order \"" + name + "\"; there are vtk, fsl, mrtrix, voigt, lower, plane, 2x2"));
 }
 
 }  // namespace

@@ -126,18 +126,6 @@ TEST(FlatMesh, DefaultsAreATypicalEdge) {
   EXPECT_NEAR(grid.to_world.linear()(0, 0), 0.5, 1e-12);
 }
 
-TEST(FlatMesh, GradientsOfVectorsOfTwoComponents) {
-  const TemporaryFolder folder;
-  const Grid mesh = square(VTK_TRIANGLE);
-  add_array<2>(*mesh, "u", [](const Vector3d& p) { return Eigen::Vector2d(2 * p.x() + 3 * p.y(), 5 * p.x() - p.y()); });
-  write_xml(*mesh, folder / "a.vtu");
-  ImportSettings settings;
-  settings.array = "u";
-  settings.take = Take::gradient;
-  const Matrix3d expected = (Matrix3d() << 2, 3, 0, 5, -1, 0, 0, 0, 0).finished();
-  expect_everywhere(import(folder / "a.vtu", settings), [&](const Vector3d&) { return expected; });
-}
-
 TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
   const TemporaryFolder folder;
   const Grid mesh = square(VTK_QUAD);
@@ -207,21 +195,6 @@ TEST(FlatMesh, FlatImagesAndRectilinearGrids) {
   settings.sampling.resolution = 0.5;
   const TensorGrid sampled = import(folder / "a.vtr", settings);
   EXPECT_EQ(sampled.active_voxels(), 81u);
-}
-
-TEST(FlatMesh, ValuesOfCells) {
-  const TemporaryFolder folder;
-  const Grid mesh = square(VTK_POLYGON);
-  vtkNew<vtkDoubleArray> values;
-  values->SetName("S");
-  values->SetNumberOfComponents(9);
-  values->SetNumberOfTuples(mesh->GetNumberOfCells());
-  for (int c = 0; c < 9; ++c) values->FillComponent(c, c);
-  mesh->GetCellData()->AddArray(values);
-  write_xml(*mesh, folder / "a.vtu");
-  const TensorGrid grid = import(folder / "a.vtu");
-  EXPECT_GT(grid.active_voxels(), 50u);
-  for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& tensor) { EXPECT_EQ(tensor(1, 2), 5); });
 }
 
 TEST(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {

@@ -235,18 +235,6 @@ TEST(MeshSampling, OverlappingCellsGiveTheSameOnAnyNumberOfThreads) {
   }
 }
 
-TEST(MeshSampling, BlocksAreOrderedAndNoneIsEmpty) {
-  const auto mesh = hollow_cylinder(32, 4);
-  add_linear_tensor(*mesh);
-  const TensorGrid grid = sampled(*mesh, resolution(60));
-  const auto key = [](const TensorBlock& b) { return std::make_tuple(b.origin.x(), b.origin.y(), b.origin.z()); };
-  for (std::size_t i = 0; i < grid.blocks.size(); ++i) {
-    EXPECT_TRUE(grid.blocks[i].active.any());
-    if (i == 0) continue;
-    EXPECT_LT(key(grid.blocks[i - 1]), key(grid.blocks[i]));
-  }
-}
-
 TEST(MeshSampling, StopsWhenCancelledAndReportsToTheCaller) {
   const auto mesh = unit_cube(VTK_HEXAHEDRON, 3, identity);
   add_linear_tensor(*mesh);

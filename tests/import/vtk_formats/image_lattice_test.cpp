@@ -14,7 +14,6 @@
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
-#include <vtkUnsignedCharArray.h>
 
 #include "tests/import/mesh_files.h"
 
@@ -100,15 +99,6 @@ TEST(ImageLatticeTest, FlatImages) {
   EXPECT_EQ(of_cells.size, Eigen::Vector3i(3, 1, 2));
   EXPECT_DOUBLE_EQ(of_points.to_world.linear().determinant(), 0.5 * 0.5 * 2);
   EXPECT_TRUE((of_cells.to_world * Eigen::Vector3d(0, 0, 0)).isApprox(Eigen::Vector3d(0.25, 7, 1)));
-}
-
-TEST(ImageLatticeTest, HiddenVoxelsAreNotNumbers) {
-  const auto image = oblique_image();
-  const auto array = counting<vtkFloatArray>("stress", 9, image->GetNumberOfPoints());
-  image->AllocatePointGhostArray()->SetValue(17, vtkDataSetAttributes::HIDDENPOINT);
-  image->GetPointGhostArray()->SetValue(18, vtkDataSetAttributes::DUPLICATEPOINT);
-  const std::vector<double> values = read_all(lattice_of(image, array, false));
-  for (std::size_t i = 0; i < values.size(); ++i) EXPECT_EQ(std::isnan(values[i]), i / 9 == 17);
 }
 
 TEST(ImageLatticeTest, ImagesThatCannotBe) {

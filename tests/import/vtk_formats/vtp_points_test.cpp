@@ -56,16 +56,6 @@ TEST(VtpPoints, HoldEveryPointAndAttribute) {
   }
 }
 
-TEST(VtpPoints, NoPoints) {
-  const TemporaryFolder folder;
-  const std::filesystem::path path = folder / "a.vtp";
-  write_points(path, {});
-  vtkNew<vtkXMLPolyDataReader> reader;
-  reader->SetFileName(path.c_str());
-  reader->Update();
-  EXPECT_EQ(reader->GetOutput()->GetNumberOfPoints(), 0);
-}
-
 TEST(VtpPoints, FullDiskIsNoticed) {
   const PointCloud cloud = cloud_of(20000, 0.5f);
   const TemporaryFolder folder;

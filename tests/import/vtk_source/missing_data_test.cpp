@@ -1,6 +1,5 @@
 // Cells and points without data leave a hole of their own size; all kinds of data sets treat ghosts alike.
 
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -285,22 +284,6 @@ TEST(MissingData, PiecesMayHaveComponentsInOtherOrders) {
   for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
     EXPECT_LT((tensor - expected).norm(), 1e-5) << p.transpose();
   });
-}
-
-/// The parts of a mesh may share all points, and have as many cells.
-TEST(MissingData, PiecesOfTheSamePointsAreNotTheSameMesh) {
-  const TemporaryFolder folder;
-  const auto mesh = cubes();
-  add_ones(*mesh->GetPointData(), *mesh, "T", 9, false, [](double) { return false; });
-  std::array<vtkSmartPointer<vtkUnstructuredGrid>, 2> parts;
-  for (std::size_t part = 0; part < 2; ++part) {
-    parts[part] = vtkSmartPointer<vtkUnstructuredGrid>::New();
-    parts[part]->SetPoints(mesh->GetPoints());
-    parts[part]->GetPointData()->ShallowCopy(mesh->GetPointData());
-    for (vtkIdType id = static_cast<vtkIdType>(part); id < mesh->GetNumberOfCells(); id += 2)
-      parts[part]->InsertNextCell(VTK_HEXAHEDRON, mesh->GetCell(id)->GetPointIds());
-  }
-  EXPECT_EQ(active_voxels(write_halves(folder, *parts[0], *parts[1]), "T").size(), whole);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "tools/import/vtk_source/vtk_collection.h"
+// Blocks (.vtm) and time series (.pvd).
 
 #include <string>
 

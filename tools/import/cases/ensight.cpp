@@ -4,13 +4,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 
 #include <fmt/format.h>
-#include <vtkDataArray.h>
-#include <vtkDataArrayCollection.h>
 #include <vtkDataSet.h>
 #include <vtkGenericEnSightReader.h>
 #include <vtkMultiBlockDataSet.h>
@@ -18,7 +18,7 @@
 #include <vtkSmartPointer.h>
 
 #include "base/errors.h"
-#include "base/text/short_lines.h"
+#include "base/process/process_limits.h"
 #include "base/text/text.h"
 
 namespace tensorray {
@@ -90,10 +90,10 @@ std::map<int, TimeSet> time_sets(const std::vector<Entry>& entries) {
 }
 
 /// The number in the name of a file at a time: of the last step until then.
-double file_number(const TimeSet& set, std::optional<double> time) {
+double file_number(const TimeSet& set, float time) {
   std::size_t step = 0;
-  for (std::size_t i = 0; time && i < set.times.size(); ++i)
-    if (static_cast<float>(set.times[i]) <= static_cast<float>(*time)) step = i;
+  for (std::size_t i = 0; i < set.times.size(); ++i)
+    if (static_cast<float>(set.times[i]) <= time) step = i;
   if (set.numbers.empty()) return set.start + set.increment * static_cast<double>(step);
   return set.numbers[std::min(step, set.numbers.size() - 1)];
 }
@@ -109,7 +109,7 @@ int take_set(std::vector<std::string>& words) {
 }
 
 /// The file of an entry "[TIME SET] [FILE SET] [DESCRIPTION] FILE"; empty if its name is not known.
-fs::path file_of(const Entry& entry, const std::map<int, TimeSet>& sets, std::optional<double> time) {
+fs::path file_of(const Entry& entry, const std::map<int, TimeSet>& sets, float time) {
   std::istringstream stream(entry.value);
   std::vector<std::string> words;
   for (std::string word; stream >> word;) words.push_back(word);
@@ -198,27 +198,6 @@ void require_no_devices(const Entry& entry, const fs::path& folder) {
   }
 }
 
-/// The readers of text take time, and memory, for as many points and cells as a part announces. @throw
-/// std::runtime_error naming the file, if a line after the name of a type announces more than there are bytes.
-void check_counts(const fs::path& path) {
-  static const std::set<std::string> types{"coordinates", "point",   "bar2",   "bar3",    "tria3",    "tria6",
-                                           "quad4",       "quad8",   "tetra4", "tetra10", "pyramid5", "pyramid13",
-                                           "penta6",      "penta15", "hexa8",  "hexa20",  "nsided",   "nfaced"};
-  const auto most = static_cast<double>(fs::file_size(path));
-  std::string before;
-  int left_out = 2;  // Lines of a description, or of a part's number and description.
-  for_each_short_line(path, 80, [&](const std::string& line) {
-    if (left_out-- > 0) return true;
-    const std::string text = trimmed(line);
-    if (types.count(before) > 0 && std::strtod(text.c_str(), nullptr) > most)
-      fail(path, "is damaged or cut off: it announces \"" + before + " " + escaped(text) +
-                     "\", which it cannot hold; copy or write it again");
-    left_out = text == "part" ? 2 : 0;
-    before = starts_with(text, "g_") ? text.substr(2) : text;
-    return true;
-  });
-}
-
 /// In a case with file sets VTK seeks the steps in all files, and goes on for ever in one without.
 void check_file_sets(const std::vector<Entry>& entries, const EnSightCase& given) {
   const auto is_set = [](const Entry& entry) { return entry.section == "FILE" && entry.name == "file set"; };
@@ -247,23 +226,25 @@ void check_ends(const EnSightCase& given, vtkDataObject& read) {
   }
 }
 
-/// @param path  ensight_case has accepted it: with some damaged cases the reader never ends.
-std::vector<double> open_ensight(const std::filesystem::path& path, vtkGenericEnSightReader& reader) {
-  reader.SetCaseFileName(std::filesystem::absolute(path).c_str());
-  reader.UpdateInformation();
-  std::vector<double> times;
-  vtkDataArrayCollection* const sets = reader.GetTimeSets();
-  for (int i = 0; sets && i < sets->GetNumberOfItems(); ++i)
-    for (vtkIdType k = 0; k < sets->GetItem(i)->GetNumberOfTuples(); ++k)
-      times.push_back(sets->GetItem(i)->GetComponent(k, 0));
-  std::sort(times.begin(), times.end());
-  times.erase(std::unique(times.begin(), times.end()), times.end());
-  return times;
+vtkSmartPointer<vtkDataObject> read_step(const fs::path& path, std::size_t step) {
+  const EnSightCase given = ensight_case(path, step);
+  double memory = 0;
+  for (const EnSightFile& file : given.files) memory += max_memory_of(file.file);
+  const ExtraMemoryLimit limit(memory);
+  vtkNew<vtkGenericEnSightReader> reader;
+  reader->SetCaseFileName(fs::absolute(path).c_str());
+  reader->UpdateInformation();
+  reader->ReadAllVariablesOn();
+  if (!given.times.empty()) reader->SetTimeValue(given.times[step]);
+  reader->Update();
+  const vtkSmartPointer<vtkDataObject> result = reader->GetOutputDataObject(0);
+  if (result) check_ends(given, *result);
+  return result;
 }
 
 }  // namespace
 
-EnSightCase ensight_case(const fs::path& path, std::optional<double> time) {
+EnSightCase ensight_case(const fs::path& path, std::size_t step) {
   const std::vector<Entry> entries = entries_of(path);
   constexpr double max_steps = 1e6;
   for (const Entry& entry : entries)
@@ -271,6 +252,10 @@ EnSightCase ensight_case(const fs::path& path, std::optional<double> time) {
       fail(path, "has more than a million steps of time; it may be damaged: copy or write it again");
   const std::map<int, TimeSet> sets = time_sets(entries);
   EnSightCase result;
+  std::set<float> times;
+  for (const auto& [number, set] : sets) times.insert(set.times.begin(), set.times.end());
+  result.times.assign(times.begin(), times.end());
+  const float time = step < result.times.size() ? result.times[step] : -std::numeric_limits<float>::infinity();
   for (const Entry& entry : entries) {
     if (entry.section == "FORMAT" && entry.name == "type")
       result.is_gold = lower_case(entry.value).find("gold") != std::string::npos;
@@ -281,31 +266,15 @@ EnSightCase ensight_case(const fs::path& path, std::optional<double> time) {
     if (name.empty()) continue;
     if (!fs::is_regular_file(file))
       fail(file, "is missing, which " + path.filename().string() + " names; copy it there too");
-    if (is_model) check_counts(file);
     result.files.push_back({entry.name, file});
   }
   check_file_sets(entries, result);
   return result;
 }
 
-std::vector<double> ensight_times(const std::filesystem::path& path) {
-  ensight_case(path, std::nullopt);
-  return open_ensight(path, *vtkNew<vtkGenericEnSightReader>());
-}
-
-vtkSmartPointer<vtkDataObject> read_ensight(const std::filesystem::path& path, int step) {
-  const std::vector<double> times = ensight_times(path);
-  const std::optional<double> time =
-      times.empty() ? std::nullopt : std::optional(times[static_cast<std::size_t>(step)]);
-  const EnSightCase given = ensight_case(path, time);
-  vtkNew<vtkGenericEnSightReader> reader;
-  open_ensight(path, *reader);
-  reader->ReadAllVariablesOn();
-  if (time) reader->SetTimeValue(static_cast<float>(*time));
-  reader->Update();
-  const vtkSmartPointer<vtkDataObject> result = reader->GetOutputDataObject(0);
-  if (result) check_ends(given, *result);
-  return result;
+MeshFile open_ensight(const fs::path& path) {
+  return {static_cast<int>(ensight_case(path, 0).times.size()),
+          [path](int step) { return read_step(path, static_cast<std::size_t>(step)); }};
 }
 
 }  // namespace tensorray

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -61,31 +60,15 @@ std::vector<std::string> words_after(const std::string& text, const std::string&
   return words;
 }
 
-/// What a file says of the values inside: one for all cells, or a list. Neither if they are elsewhere (a macro, or
-/// another file that it includes).
-enum class Values { uniform, list, elsewhere };
-
-Values values_in(const std::string& head) {
+/// Whether a file says that its values are a list: neither one for all cells, nor elsewhere (in a macro, or in another
+/// file that it includes).
+bool has_list(const std::string& head) {
   // Fields with patches have internalField, those without have value.
   const bool has_patches =
       head.find("internalField") != std::string::npos || head.find("boundaryField") != std::string::npos;
-  for (const std::string& word : words_after(head, has_patches ? "internalField" : "value")) {
-    if (word == "uniform") return Values::uniform;
-    if (word == "nonuniform") return Values::list;
-  }
-  return Values::elsewhere;
-}
-
-/// The fields in a folder, by the names of their objects, which are those of VTK's arrays.
-std::map<std::string, Values> fields_in(const Path& time) {
-  std::map<std::string, Values> fields;
-  for (const auto& entry : std::filesystem::directory_iterator(time)) {
-    if (!entry.is_regular_file()) continue;
-    const std::string head = head_of(entry.path());
-    const std::vector<std::string> names = words_after(head, "object");
-    if (!names.empty()) fields[names.front()] = values_in(head);
-  }
-  return fields;
+  for (const std::string& word : words_after(head, has_patches ? "internalField" : "value"))
+    if (word == "uniform" || word == "nonuniform") return word == "nonuniform";
+  return false;
 }
 
 bool is_same_everywhere(vtkDataArray& array) {
@@ -111,12 +94,14 @@ void reorder(vtkDataArray& array) {
 }  // namespace
 
 void correct_uniform_tensors(vtkDataSet& data, const Path& time) {
-  for (const auto& [name, values] : fields_in(time)) {
-    if (values == Values::list) continue;
+  for (const auto& entry : std::filesystem::directory_iterator(time)) {
+    const std::string head = entry.is_regular_file() ? head_of(entry.path()) : "";
+    const std::vector<std::string> names = words_after(head, "object");  // VTK's arrays have them.
+    if (names.empty() || has_list(head)) continue;
     for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) {
-      vtkDataArray* const array = data.GetAttributes(type)->GetArray(name.c_str());
+      vtkDataArray* const array = data.GetAttributes(type)->GetArray(names.front().c_str());
       if (!array || array->GetNumberOfComponents() != 6 || array->HasAComponentName()) continue;
-      if (values == Values::uniform || is_same_everywhere(*array)) reorder(*array);
+      if (is_same_everywhere(*array)) reorder(*array);
     }
   }
 }

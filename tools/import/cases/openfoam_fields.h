@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/cases/openfoam_fields.h
-/// Corrects what VTK's reader of OpenFOAM makes of fields. Private to the importer.
+/// Corrects what VTK's reader of OpenFOAM makes of fields.
 
 #include <filesystem>
 

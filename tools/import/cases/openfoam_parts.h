@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/cases/openfoam_parts.h
-/// The folders of an OpenFOAM case: regions, and the parts that processors wrote. Private to the importer.
+/// The folders of an OpenFOAM case: regions, and the parts that processors wrote.
 
 #include <filesystem>
 #include <string>

@@ -68,16 +68,6 @@ std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
   }
 }
 
-/// Whether a dataset may have so many numbers: one whose chunks were never written takes no bytes of the file, and any
-/// memory. Numbers of virtual datasets are in other files.
-bool is_likely(hid_t data, hid_t type, std::uint64_t count) {
-  constexpr double unwritten = 64 << 20, max_expansion = 1e5;  // zstd makes 30,000 bytes of one.
-  const Id list(H5Dget_create_plist(data), H5Pclose);
-  if (H5Pget_layout(list) == H5D_VIRTUAL || H5Pget_external_count(list) > 0) return true;
-  const double bytes = static_cast<double>(H5Tget_size(type)) * static_cast<double>(count);
-  return bytes <= std::max(unwritten, max_expansion * static_cast<double>(H5Dget_storage_size(data)));
-}
-
 }  // namespace
 
 struct Hdf5File::Handle {
@@ -151,9 +141,6 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const H
   }
   const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
   const Id space(H5Dget_space(data), H5Sclose), type(H5Dget_type(data), H5Tclose);
-  if (!is_likely(data, type, count))
-    fail("is damaged: its dataset " + dataset + " announces " + std::to_string(count) +
-         " numbers, which it cannot hold; copy or write it again");
   auto [array, memory_type] = array_for(type);
   if (!array) fail("its dataset " + dataset + " has no numbers");
   array->SetNumberOfTuples(static_cast<vtkIdType>(count));
@@ -170,31 +157,35 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const H
 }
 
 std::vector<double> Hdf5File::numbers(const std::string& object, const std::string& attribute) const {
-  if (!has_attribute(object, attribute)) fail("has no attribute " + attribute + " of " + object);
-  const Id id(H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  const Id space(H5Aget_space(id), H5Sclose);
-  const hssize_t count = H5Sget_simple_extent_npoints(space);
+  const Id id(has_attribute(object, attribute)
+                  ? H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT)
+                  : -1,
+              H5Aclose);
+  const Id space(id < 0 ? -1 : H5Aget_space(id), H5Sclose);
+  const hssize_t count = space < 0 ? 0 : H5Sget_simple_extent_npoints(space);
   std::vector<double> values(static_cast<std::size_t>(std::clamp<hssize_t>(count, 0, 64)));
   if (count < 1 || count > 64 || H5Aread(id, H5T_NATIVE_DOUBLE, values.data()) < 0)
-    fail("its attribute " + attribute + " of " + object + " has no numbers");
+    fail("has no attribute " + attribute + " of " + object + " with numbers");
   return values;
 }
 
 std::string Hdf5File::text(const std::string& object, const std::string& attribute) const {
-  if (!has_attribute(object, attribute)) fail("has no attribute " + attribute + " of " + object);
-  const Id id(H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  const Id type(H5Aget_type(id), H5Tclose);
-  if (H5Tget_class(type) != H5T_STRING) fail("its attribute " + attribute + " of " + object + " is no text");
-  if (H5Tis_variable_str(type) > 0) {
+  const Id id(has_attribute(object, attribute)
+                  ? H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT)
+                  : -1,
+              H5Aclose);
+  const Id type(id < 0 ? -1 : H5Aget_type(id), H5Tclose);
+  const bool is_text = type >= 0 && H5Tget_class(type) == H5T_STRING;
+  if (is_text && H5Tis_variable_str(type) > 0) {
     char* text = nullptr;
     if (H5Aread(id, type, &text) < 0 || !text) fail("its attribute " + attribute + " cannot be read");
     const std::string result = text;
     H5free_memory(text);
     return result;
   }
-  std::string result(std::min<std::size_t>(H5Tget_size(type), 4096), '\0');
-  if (result.size() != H5Tget_size(type) || H5Aread(id, type, result.data()) < 0)
-    fail("its attribute " + attribute + " cannot be read");
+  std::string result(is_text ? std::min<std::size_t>(H5Tget_size(type), 4096) : 0, '\0');
+  if (!is_text || result.size() != H5Tget_size(type) || H5Aread(id, type, result.data()) < 0)
+    fail("has no attribute " + attribute + " of " + object + " with text");
   return result.c_str();
 }
 

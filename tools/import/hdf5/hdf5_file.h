@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/hdf5/hdf5_file.h
-/// Reads datasets of HDF5 files as VTK's arrays. Only the .cpp file includes HDF5. Private to the importer.
+/// Reads datasets of HDF5 files as VTK's arrays. Only the .cpp file includes HDF5.
 
 #include <cstdint>
 #include <filesystem>

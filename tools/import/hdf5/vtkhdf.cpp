@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -155,7 +156,7 @@ vtkSmartPointer<vtkUnstructuredGrid> grid_of(const File& file, const Part& part)
   return grid;
 }
 
-/// Adds the values of a group of arrays. @param first  Of the rows of the step; @param before  Of parts before.
+/// Adds the values of a group of arrays. @param before  Values of the parts before. @param count  Of this part.
 void add_values(const File& file, const std::string& group, int step, std::uint64_t before, std::uint64_t count,
                 vtkDataSetAttributes& target) {
   for (const std::string& name : file.arrays(group)) {
@@ -224,17 +225,12 @@ vtkSmartPointer<vtkDataObject> read_image(const File& file, int step) {
 
 }  // namespace
 
-int vtkhdf_steps(const Path& path) {
-  const File file(path);
-  if (!file.has_steps()) return 1;
-  const double steps = file.hdf.numbers(root + "/Steps", "NSteps")[0];
+MeshFile open_vtkhdf(const Path& path) {
+  const auto file = std::make_shared<const File>(path);
+  const double steps = file->has_steps() ? file->hdf.numbers(root + "/Steps", "NSteps")[0] : 1;
   if (!(steps >= 1 && steps < 1e9)) fail(path, "is damaged: its number of steps");
-  return static_cast<int>(steps);
-}
-
-vtkSmartPointer<vtkDataObject> read_vtkhdf(const Path& path, int step) {
-  const File file(path);
-  return file.type == "ImageData" ? read_image(file, step) : read_grids(file, step);
+  return {static_cast<int>(steps),
+          [file](int step) { return file->type == "ImageData" ? read_image(*file, step) : read_grids(*file, step); }};
 }
 
 }  // namespace tensorray

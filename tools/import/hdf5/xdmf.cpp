@@ -1,9 +1,7 @@
 #include "tools/import/hdf5/xdmf.h"
 
 #include <algorithm>
-#include <cstring>
-#include <limits>
-#include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -24,7 +22,6 @@
 #include <vtkStructuredGrid.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
-#include <vtkXMLDataElement.h>
 
 #include "base/errors.h"
 #include "base/text/text.h"
@@ -36,7 +33,7 @@ namespace tensorray {
 namespace {
 
 using Path = std::filesystem::path;
-using Element = vtkXMLDataElement;
+using Element = XmlElement;
 
 /// A type of cells: its names, its number in mixed topologies, VTK's type, and its points (0: any number).
 struct CellKind {
@@ -86,9 +83,7 @@ struct Grid {
     if (found.empty()) fail(std::string("has no ") + name + "; write it again");
     const std::string reference = xml_attribute(*found.front(), {"Reference"});
     if (reference.empty()) return *found.front();
-    const char* const text = found.front()->GetCharacterData();
-    std::string path = lower_case(reference) == "xml" ? (text ? text : "") : reference;
-    path.erase(std::remove_if(path.begin(), path.end(), [](char c) { return c == '\n' || c == '\t'; }), path.end());
+    const std::string path = lower_case(reference) == "xml" ? xml_text(*found.front()) : reference;
     const std::vector<Element*> there = document.find(path, *found.front());
     if (there.empty()) fail(std::string("has a ") + name + " that refers to what is not there: " + escaped(path));
     return *there.front();
@@ -301,20 +296,14 @@ void add_arrays(vtkDataSet& from, vtkDataSet& to) {
     to.GetCellData()->AddArray(from.GetCellData()->GetArray(i));
 }
 
-}  // namespace
-
-int xdmf_steps(const Path& path) { return XdmfDocument(path).steps(); }
-
-vtkSmartPointer<vtkDataObject> read_xdmf(const Path& path, int step) {
-  const XdmfDocument document(path);
-  std::vector<vtkSmartPointer<vtkDataSet>> meshes;
+vtkSmartPointer<vtkDataObject> read_grids(const XdmfDocument& document, int step) {
+  DataSets meshes;
   for (Element* const element : document.grids(step)) {
     const Grid grid{document, *element};
     const vtkSmartPointer<vtkDataSet> mesh = mesh_of(grid);
     add_attributes(grid, *mesh);
-    const auto same = std::find_if(meshes.begin(), meshes.end(), [&](const vtkSmartPointer<vtkDataSet>& other) {
-      return is_same_mesh(*mesh, *other);
-    });
+    const auto same =
+        std::find_if(meshes.begin(), meshes.end(), [&](const auto& other) { return is_same_mesh(*mesh, *other); });
     if (same == meshes.end())
       meshes.push_back(mesh);
     else
@@ -323,6 +312,13 @@ vtkSmartPointer<vtkDataObject> read_xdmf(const Path& path, int step) {
   auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();
   for (std::size_t i = 0; i < meshes.size(); ++i) blocks->SetBlock(static_cast<unsigned int>(i), meshes[i]);
   return blocks;
+}
+
+}  // namespace
+
+MeshFile open_xdmf(const Path& path) {
+  const auto document = std::make_shared<const XdmfDocument>(path);
+  return {document->steps(), [document](int step) { return read_grids(*document, step); }};
 }
 
 }  // namespace tensorray

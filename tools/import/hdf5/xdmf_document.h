@@ -1,18 +1,20 @@
 #pragma once
 /// @file tools/import/hdf5/xdmf_document.h
-/// The XML of an XDMF file: which grids there are at each step of time, and references between elements. Private to the
-/// importer. The format: https://www.xdmf.org/index.php/XDMF_Model_and_Format
+/// The XML of an XDMF file: which grids there are at each step of time, and references between elements. Only the .cpp
+/// file includes libxml2. The format: https://www.xdmf.org/index.php/XDMF_Model_and_Format
 
 #include <filesystem>
 #include <initializer_list>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include <vtkSmartPointer.h>
-
-class vtkXMLDataElement;
+struct _xmlDoc;
+struct _xmlNode;
 
 namespace tensorray {
+
+using XmlElement = _xmlNode;
 
 class XdmfDocument {
  public:
@@ -24,24 +26,27 @@ class XdmfDocument {
 
   /// The uniform grids at a step, from 0 on. Grids of time that stand beside each other, as FEniCSx writes one for each
   /// function, are parts of the same step.
-  const std::vector<vtkXMLDataElement*>& grids(int step) const { return steps_[static_cast<std::size_t>(step)]; }
+  const std::vector<XmlElement*>& grids(int step) const { return steps_[static_cast<std::size_t>(step)]; }
 
   /// The elements in an element with one of the names. Elements that XInclude takes from elsewhere are among them.
-  std::vector<vtkXMLDataElement*> children(vtkXMLDataElement& element, const std::vector<std::string>& names) const;
+  std::vector<XmlElement*> children(XmlElement& element, const std::vector<std::string>& names) const;
 
-  /// The elements that a path of XPath means, of which the parts are names, *, [number], [@Attribute='value'] and
-  /// [self::Name or ...]. @param from  Where a relative path begins.
-  std::vector<vtkXMLDataElement*> find(const std::string& xpath, vtkXMLDataElement& from) const;
+  /// The elements that a path of XPath means. @param from  Where a relative path begins.
+  std::vector<XmlElement*> find(const std::string& xpath, XmlElement& from) const;
 
  private:
-  void add_steps(vtkXMLDataElement& grid, std::vector<std::vector<vtkXMLDataElement*>>& steps, int depth) const;
+  using Steps = std::vector<std::vector<XmlElement*>>;
+  void add_steps(XmlElement& grid, Steps& steps, int depth) const;
 
   std::filesystem::path path_;
-  vtkSmartPointer<vtkXMLDataElement> root_;
-  std::vector<std::vector<vtkXMLDataElement*>> steps_;
+  std::shared_ptr<_xmlDoc> document_;
+  Steps steps_;
 };
 
 /// An attribute's text; the first of the names that is there; empty if none is.
-std::string xml_attribute(vtkXMLDataElement& element, std::initializer_list<const char*> names);
+std::string xml_attribute(XmlElement& element, std::initializer_list<const char*> names);
+
+/// What is between an element's tags, without blanks around it.
+std::string xml_text(XmlElement& element);
 
 }  // namespace tensorray

@@ -10,7 +10,6 @@
 #include <vtkDataArray.h>
 #include <vtkDoubleArray.h>
 #include <vtkIdTypeArray.h>
-#include <vtkXMLDataElement.h>
 
 #include "base/errors.h"
 #include "base/text/byte_order.h"
@@ -21,11 +20,11 @@
 namespace tensorray {
 namespace {
 
-using Element = vtkXMLDataElement;
+using Element = XmlElement;
 using Array = vtkSmartPointer<vtkDataArray>;
 using Sizes = std::vector<std::uint64_t>;
 
-constexpr int deepest = 16;  // Of references to references.
+constexpr int deepest_item = 16;  // Of references to references.
 
 XdmfValues values_of(const XdmfDocument& document, Element& item, int depth);
 
@@ -40,13 +39,6 @@ std::uint64_t product(const Sizes& sizes) {
     result *= size;
   }
   return result;
-}
-
-std::string text_of(Element& item) {
-  std::string text = item.GetCharacterData() ? item.GetCharacterData() : "";
-  text.erase(0, std::min(text.size(), text.find_first_not_of(" \t\r\n")));
-  text.erase(text.find_last_not_of(" \t\r\n") + 1);
-  return text;
 }
 
 Sizes dimensions_of(Element& item) { return integers_in(xml_attribute(item, {"Dimensions"})); }
@@ -66,7 +58,7 @@ Array new_array(bool integers, std::uint64_t count) {
 
 XdmfValues values_of_xml(const XdmfDocument& document, Element& item) {
   std::vector<double> numbers;
-  const std::string text = text_of(item);
+  const std::string text = xml_text(item);
   const char* at = text.c_str();
   for (char* end = nullptr;; at = end) {
     const double number = std::strtod(at, &end);
@@ -90,7 +82,7 @@ struct HdfPlace {
 };
 
 HdfPlace hdf_place(const XdmfDocument& document, Element& item) {
-  const std::string text = text_of(item);
+  const std::string text = xml_text(item);
   const std::size_t bar = text.find('|'), colon = text.substr(0, bar).rfind(":/");
   if (colon == std::string::npos) fail_item(document, "names no dataset of an HDF5 file: '" + escaped(text) + "'");
   HdfPlace place{document.path().parent_path() / text.substr(0, colon),
@@ -120,7 +112,7 @@ void copy_numbers(const std::vector<char>& bytes, ByteOrder order, vtkDataArray&
 }
 
 XdmfValues values_of_binary(const XdmfDocument& document, Element& item) {
-  const std::filesystem::path path = document.path().parent_path() / text_of(item);
+  const std::filesystem::path path = document.path().parent_path() / xml_text(item);
   XdmfValues values{nullptr, dimensions_of(item)};
   const std::string type = lower_case(xml_attribute(item, {"NumberType", "DataType"}));
   const std::string precision = xml_attribute(item, {"Precision"}),
@@ -230,9 +222,9 @@ XdmfValues values_of_function(const XdmfDocument& document, Element& item, int d
 }
 
 XdmfValues values_of(const XdmfDocument& document, Element& item, int depth) {
-  if (depth > deepest) fail_item(document, "refers to itself");
+  if (depth > deepest_item) fail_item(document, "refers to itself");
   if (const std::string reference = xml_attribute(item, {"Reference"}); !reference.empty()) {
-    const std::string path = lower_case(reference) == "xml" ? text_of(item) : reference;
+    const std::string path = lower_case(reference) == "xml" ? xml_text(item) : reference;
     const std::vector<Element*> found = document.find(path, item);
     if (found.empty()) fail_item(document, "refers to what is not there: " + escaped(path));
     return values_of(document, *found.front(), depth + 1);

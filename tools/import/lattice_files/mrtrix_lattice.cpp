@@ -21,13 +21,6 @@ namespace {
 
 using Path = std::filesystem::path;
 
-/// The lines "NAME: VALUE" of a header. Lines of one name follow each other in `transform` alone.
-struct Header {
-  Path path;
-  std::string dim, vox, layout, datatype, scaling, file;
-  std::vector<std::string> transform;
-};
-
 [[noreturn]] void fail_header(const Path& path, const std::string& what) {
   fail(path, "its header is damaged: " + what);
 }
@@ -39,71 +32,26 @@ std::vector<std::string> split(const std::string& text) {
   return parts;
 }
 
-std::vector<double> numbers_in(const Header& header, const std::string& text, const char* name) {
-  std::vector<double> numbers;
-  for (const std::string& part : split(text)) {
-    char* end = nullptr;
-    numbers.push_back(std::strtod(part.c_str(), &end));
-    if (part.empty() || *end != '\0') fail_header(header.path, name);
-  }
-  return numbers;
-}
-
-void read_line(Header& header, const std::string& line) {
-  const std::size_t colon = line.find(':');
-  if (colon == std::string::npos) return;
-  const std::string name = lower_case(line.substr(0, colon));
-  const std::string value = trimmed(line.substr(colon + 1));
-  for (const auto& [field, text] : {std::pair("dim", &header.dim),
-                                    {"vox", &header.vox},
-                                    {"layout", &header.layout},
-                                    {"datatype", &header.datatype},
-                                    {"scaling", &header.scaling}})
-    if (name == field) *text = value;
-  if (name == "transform") header.transform.push_back(value);
-  if (name != "file") return;
-  if (!header.file.empty())
-    fail(header.path,
-         "its numbers are in several files: convert it (mrconvert " + header.path.filename().string() + " one.mif)");
-  header.file = value;
-}
-
-Header read_header(const Path& path) {
-  std::error_code none;
-  if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
-  constexpr std::size_t longest = 1 << 22;  // of a header, which may list all gradients
-  const auto bytes = read_some({path, 0, ends_with(lower_case(path.string()), ".gz"), 0}, longest);
-  std::istringstream stream(std::string(bytes.begin(), bytes.end()));
-  Header header{path, {}, {}, {}, {}, {}, {}, {}};
-  std::string line;
-  if (!std::getline(stream, line) || line.compare(0, 12, "mrtrix image") != 0) fail(path, "is not an image of MRtrix");
-  while (std::getline(stream, line)) {
-    if (line == "END" || line == "END\r") return header;
-    read_line(header, line);
-  }
-  if (header.file.empty()) fail(path, "is cut off in its header");
-  return header;  // A .mih has no END.
-}
+bool is_packed(const Path& path) { return ends_with(lower_case(path.string()), ".gz"); }
 
 /// Four extents: of x, y and z, and of the components.
-std::vector<std::int64_t> extents_of(const Header& header) {
+std::vector<std::int64_t> extents_of(const HeaderLines& header) {
   std::vector<std::int64_t> extents;
   double product = 1;
-  for (const double extent : numbers_in(header, header.dim, "dim")) {
+  for (const double extent : header.numbers("dim")) {
     product *= extent;
     if (!(extent >= 1) || extent != std::floor(extent) || product > 1e15) fail_header(header.path, "dim");
     extents.push_back(static_cast<std::int64_t>(extent));
   }
   if (extents.size() != 4 || (extents[3] != 3 && extents[3] != 6 && extents[3] != 9))
-    fail(header.path, "its size is " + escaped(header.dim) +
-                          ": a tensor has four axes, the last one of six or nine "
-                          "volumes, a vector three");
+    fail(header.path, "its size is " + escaped(header.text("dim")) +
+                          ": a tensor has four axes, the last one of six or nine volumes, a vector three");
   return extents;
 }
 
 /// Sets the strides and the first number. `layout` has the rank of each axis, from the fastest on, and its sense.
-void set_layout(const Header& header, const std::vector<std::int64_t>& extents, RawVoxels& voxels) {
-  const std::vector<std::string> parts = split(header.layout);
+void set_layout(const HeaderLines& header, const std::vector<std::int64_t>& extents, RawVoxels& voxels) {
+  const std::vector<std::string> parts = split(header.text("layout"));
   std::vector<int> axis_of_rank(4, -1);
   for (std::size_t axis = 0; axis < parts.size(); ++axis) {
     const double rank = std::abs(std::atof(parts[axis].c_str()));
@@ -122,60 +70,59 @@ void set_layout(const Header& header, const std::vector<std::int64_t>& extents, 
   }
 }
 
-void set_type(const Header& header, RawVoxels& voxels) {
-  std::string name = header.datatype;
+void set_type(const HeaderLines& header, RawVoxels& voxels) {
+  std::string name = header.text("datatype");
   const std::string ending = name.size() > 2 ? lower_case(name.substr(name.size() - 2)) : "";
   if (ending == "le" || ending == "be") name.resize(name.size() - 2);
   const std::optional<NumberType> type = number_type(name);
-  if (!type) fail(header.path, "its numbers are " + escaped(header.datatype) + ", not integers or reals");
+  if (!type) fail(header.path, "its numbers are " + escaped(header.text("datatype")) + ", not integers or reals");
   voxels.type = *type;
   if (ending == "le") voxels.order = ByteOrder::little;
   if (ending == "be") voxels.order = ByteOrder::big;
-  if (header.scaling.empty()) return;
-  const std::vector<double> scaling = numbers_in(header, header.scaling, "scaling");
+  const std::vector<double> scaling = header.numbers("scaling", {0, 1});
   if (scaling.size() != 2) fail_header(header.path, "scaling");
   voxels.intercept = scaling[0];
   voxels.slope = scaling[1];
 }
 
-RawPlace place_of(const Header& header) {
-  std::istringstream stream(header.file);
+RawPlace place_of(const HeaderLines& header) {
+  const std::string file = header.text("file");
+  if (file.find('\n') != std::string::npos)
+    fail(header.path,
+         "its numbers are in several files: convert it (mrconvert " + header.path.filename().string() + " one.mif)");
+  std::istringstream stream(file);
   std::string name;
   std::uint64_t offset = 0;
   stream >> name >> offset;
   if (name.empty()) fail_header(header.path, "file");
-  RawPlace place{header.path, 0, ends_with(lower_case(header.path.string()), ".gz"), 0};
-  if (name != ".") place = {header.path.parent_path() / name, 0, ends_with(lower_case(name), ".gz"), 0};
+  RawPlace place;
+  place.file = name == "." ? header.path : header.path.parent_path() / name;
+  place.is_compressed = is_packed(place.file);
   (place.is_compressed ? place.skipped : place.offset) = offset;
   return place;
 }
 
 /// Without a transform, the middle of the image is at the origin.
-Eigen::Affine3d to_world(const Header& header, const Eigen::Vector3i& size) {
-  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  if (!header.transform.empty() && header.transform.size() != 3 && header.transform.size() != 4)
-    fail_header(header.path, "transform");
-  for (std::size_t row = 0; row < std::min<std::size_t>(3, header.transform.size()); ++row) {
-    const std::vector<double> values = numbers_in(header, header.transform[row], "transform");
-    if (values.size() != 4) fail_header(header.path, "transform");
-    matrix.row(static_cast<int>(row)) = Eigen::Map<const Eigen::RowVector4d>(values.data());
-  }
-  const std::vector<double> vox = numbers_in(header, header.vox, "vox");
+Eigen::Affine3d to_world(const HeaderLines& header, const Eigen::Vector3i& size) {
+  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+  const std::vector<double> rows = header.numbers("transform");
+  if (!rows.empty() && rows.size() != 12 && rows.size() != 16) fail_header(header.path, "transform");
+  if (!rows.empty()) transform.affine() = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(rows.data());
+  const std::vector<double> vox = header.numbers("vox");
   if (vox.size() < 3) fail_header(header.path, "vox");
-  Eigen::Affine3d transform(matrix);
   transform.linear() *= Eigen::Vector3d(vox.data()).asDiagonal();
-  if (header.transform.empty())
-    transform.translation() = transform.linear() * (-0.5 * (size.cast<double>().array() - 1)).matrix();
-  const Eigen::Matrix3d linear = transform.linear();
-  if (!transform.matrix().allFinite() || !(std::abs(linear.determinant()) > 1e-9 * linear.colwise().norm().prod()))
-    fail(header.path, "its transform and voxel sizes cannot be inverted: correct them (mrtransform)");
+  if (rows.empty()) transform.translation() = transform.linear() * (-0.5 * (size.cast<double>().array() - 1)).matrix();
+  require_invertible(header.path, transform,
+                     "its transform and voxel sizes cannot be inverted: correct them (mrtransform)");
   return transform;
 }
 
 }  // namespace
 
 Lattice open_mrtrix(const Path& path) {
-  const Header header = read_header(path);
+  require_file(path);
+  const HeaderLines header = header_lines({path, 0, is_packed(path), 0}, ':', "END");
+  if (header.text("file").empty()) fail(path, "is not an image of MRtrix, or cut off in its header");
   const std::vector<std::int64_t> extents = extents_of(header);
   for (int axis = 0; axis < 3; ++axis)
     if (extents[static_cast<std::size_t>(axis)] > std::numeric_limits<int>::max()) fail_header(path, "dim");
@@ -184,10 +131,7 @@ Lattice open_mrtrix(const Path& path) {
   lattice.components = static_cast<int>(extents[3]);
   if (lattice.components == 6) lattice.usual_order = TensorOrder::mrtrix;
   lattice.to_world = to_world(header, lattice.size);
-  lattice.fsl_frame = axes_of(ComponentFrame::fsl, lattice.to_world.linear());
-  lattice.lower_frame = axes_of(ComponentFrame::voxels, lattice.to_world.linear());
-  lattice.takes_frame = true;
-  lattice.zero_is_background = true;
+  lattice.order_tells_frame = lattice.takes_frame = lattice.zero_is_background = true;
   RawVoxels voxels;
   set_type(header, voxels);
   set_layout(header, extents, voxels);

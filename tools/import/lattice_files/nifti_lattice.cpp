@@ -28,8 +28,6 @@
 namespace tensorray {
 namespace {
 
-using Eigen::Matrix3d;
-
 using Image = std::unique_ptr<nifti_image, decltype(&nifti_image_free)>;
 
 NumberType type_of(int datatype, const std::filesystem::path& path) {
@@ -66,8 +64,7 @@ bool begins_with_size(const std::string& name) {
 }
 
 Image read_header(const std::filesystem::path& path) {
-  std::error_code none;
-  if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
+  require_file(path);
   nifti_set_debug_level(0);  // Stop the library from printing.
   const std::string name = path.string();
   if (!begins_with_size(name)) fail(path, "is not a NIfTI file, or cut off in its header");
@@ -134,13 +131,9 @@ Eigen::Affine3d to_world(const nifti_image& image, const std::filesystem::path& 
   const double unit = image.xyz_units == NIFTI_UNITS_METER ? 1e3 : image.xyz_units == NIFTI_UNITS_MICRON ? 1e-3 : 1.0;
   Eigen::Affine3d transform;
   transform.matrix() << unit * matrix.topRows<3>(), Eigen::RowVector4d::UnitW();
-  const Matrix3d linear = transform.linear();
-  const double volume = linear.colwise().norm().prod();
-  if (!transform.matrix().allFinite() || !(std::abs(linear.determinant()) > 1e-9 * volume))
-    fail(path, fmt::format("its {} cannot be inverted: set it (with fslorient, mrtransform or nibabel)",
-                           image.sform_code > 0   ? "sform"
-                           : image.qform_code > 0 ? "qform"
-                                                  : "voxel size"));
+  const char* const form = image.sform_code > 0 ? "sform" : image.qform_code > 0 ? "qform" : "voxel size";
+  require_invertible(path, transform,
+                     fmt::format("its {} cannot be inverted: set it (with fslorient, mrtransform or nibabel)", form));
   return transform;
 }
 
@@ -164,14 +157,11 @@ Lattice open_nifti(const std::filesystem::path& given) {
       fail(path, "its NIfTI header is damaged: sizes");
   lattice.size = {static_cast<int>(image->nx), static_cast<int>(image->ny), static_cast<int>(image->nz)};
   lattice.to_world = to_world(*image, path);
-  lattice.fsl_frame = axes_of(ComponentFrame::fsl, lattice.to_world.linear());
-  lattice.lower_frame = axes_of(ComponentFrame::voxels, lattice.to_world.linear());
-  lattice.takes_frame = true;
+  lattice.order_tells_frame = lattice.takes_frame = lattice.zero_is_background = true;
   if (!has_orientation(*image))
     lattice.notes.push_back(
         "states no orientation (the codes of sform and qform are 0): its first axis is taken to run from right to "
         "left, as FSL does; set the sform if it does not");
-  lattice.zero_is_background = true;
   if (image->intent_code == NIFTI_INTENT_SYMMATRIX && lattice.components == 6)
     lattice.order = TensorOrder::lower_triangle;
   if (lattice.order)

@@ -119,8 +119,7 @@ void check_size(const Header& header, const std::filesystem::path& path) {
 }  // namespace
 
 Lattice open_npy(const std::filesystem::path& path) {
-  std::error_code none;
-  if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
+  require_file(path);
   std::ifstream file(path, std::ios::binary);
   if (!file) fail(path, "cannot be read");
   const Header header = read_header(file, path);

@@ -60,8 +60,7 @@ std::string last_error() {
 /// Refuses files that Teem would read as another kind (text, pictures), standard input, and patterns of file names,
 /// which Teem passes to printf.
 void check_header(const std::filesystem::path& path) {
-  std::error_code none;
-  if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
+  require_file(path);
   std::ifstream file(path, std::ios::binary);
   std::string line(1 << 16, '\0');
   file.getline(line.data(), static_cast<std::streamsize>(line.size()));
@@ -77,6 +76,7 @@ void check_header(const std::filesystem::path& path) {
       data_file.compare(0, 8, "SKIPLIST") == 0)
     fail(path, "its numbers are in several files: join them (unu save -f nrrd -i " + path.filename().string() + ")");
   if (data_file == "-") fail(path, "its data file is standard input");
+  std::error_code none;
   if (!data_file.empty() && !std::filesystem::is_regular_file(path.parent_path() / data_file, none))
     fail(path, "its data file " + escaped(data_file) + " is missing, or no file; copy it there too");
 }
@@ -174,9 +174,9 @@ Eigen::Affine3d to_world(const Nrrd& nrrd, const Axes& axes, const std::filesyst
   }
   if (nrrd.spaceDim == 3 && std::isfinite(nrrd.spaceOrigin[0]))
     transform.translation() = Eigen::Map<const Vector3d>(nrrd.spaceOrigin);
-  const Matrix3d& linear = transform.linear();
-  if (!transform.matrix().allFinite() || !(std::abs(linear.determinant()) > 1e-9 * linear.colwise().norm().prod()))
-    fail(path, "its space directions (or spacings) and origin are no transform that can be inverted: correct them");
+  require_invertible(
+      path, transform,
+      "its space directions (or spacings) and origin are no transform that can be inverted: correct them");
   return to_ras(nrrd).asDiagonal() * transform;
 }
 
@@ -193,8 +193,7 @@ Matrix3d frame_of(const Nrrd& nrrd, const std::filesystem::path& path) {
   Matrix3d frame = Matrix3d::Identity();
   if (has_frame(nrrd))
     for (int i = 0; i < 3; ++i) frame.col(i) = Eigen::Map<const Vector3d>(nrrd.measurementFrame[i]);
-  if (!frame.allFinite() || !(std::abs(frame.determinant()) > 1e-9 * frame.colwise().norm().prod()))
-    fail(path, "its measurement frame cannot be inverted: correct or remove it");
+  require_invertible(path, Eigen::Affine3d(frame), "its measurement frame cannot be inverted: correct or remove it");
   return to_ras(nrrd).asDiagonal() * frame;
 }
 

@@ -1,11 +1,15 @@
 #include "tools/import/lattice_files/raw_voxels.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
+#include <Eigen/LU>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
@@ -101,6 +105,18 @@ NumberOf reader_of(const NumberType& type) {
 
 }  // namespace
 
+void require_file(const std::filesystem::path& path) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
+}
+
+void require_invertible(const std::filesystem::path& path, const Eigen::Affine3d& transform,
+                        const std::string& is_what) {
+  const Eigen::Matrix3d linear = transform.linear();
+  if (!transform.matrix().allFinite() || !(std::abs(linear.determinant()) > 1e-9 * linear.colwise().norm().prod()))
+    fail(path, is_what);
+}
+
 std::optional<NumberType> number_type(const std::string& name) {
   using Kind = NumberType::Kind;
   const std::pair<const char*, Kind> kinds[] = {
@@ -130,6 +146,40 @@ std::vector<char, PageAllocator<char>> read_some(const RawPlace& place, std::siz
     return bytes.size() < count;
   });
   return bytes;
+}
+
+std::string HeaderLines::text(const std::string& name) const {
+  const auto found = values.find(name);
+  return found == values.end() ? "" : found->second;
+}
+
+std::vector<double> HeaderLines::numbers(const std::string& name, std::vector<double> standard) const {
+  std::string list = text(name);
+  if (list.empty()) return standard;
+  std::replace(list.begin(), list.end(), ',', ' ');
+  std::istringstream words(list);
+  std::vector<double> numbers;
+  for (std::string word; words >> word;) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(word.c_str(), &end));
+    if (*end != '\0') fail(path, "its header is damaged: " + name);
+  }
+  return numbers;
+}
+
+HeaderLines header_lines(const RawPlace& place, char separator, const std::string& last) {
+  const auto bytes = read_some(place, 1 << 22);
+  std::istringstream stream(std::string(bytes.begin(), bytes.end()));
+  HeaderLines header{place.file, {}, 0};
+  for (std::string line, name; name != last && std::getline(stream, line);) {
+    header.end += line.size() + (stream.eof() ? 0 : 1);
+    const std::size_t sign = std::min(line.find(separator), line.size());
+    name = trimmed(line.substr(0, sign));
+    if (sign == line.size()) continue;
+    std::string& value = header.values[name];
+    value += (value.empty() ? "" : "\n") + trimmed(line.substr(sign + 1));
+  }
+  return header;
 }
 
 std::shared_ptr<const char> read_numbers(const std::filesystem::path& path, const RawPlace& place,

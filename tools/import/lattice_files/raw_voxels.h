@@ -1,23 +1,31 @@
 #pragma once
 /// @file tools/import/lattice_files/raw_voxels.h
-/// The numbers of a file of voxels, as plain bytes in any order of the axes. Private to the importer.
+/// What readers of voxel files share: headers of text, and numbers that are plain bytes in any order of the axes.
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "base/text/byte_order.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
+
+/// @throw std::runtime_error naming the path, if it leads to no file.
+void require_file(const std::filesystem::path& path);
+
+/// @throw std::runtime_error naming the path and what `is_what` says, unless a transform is finite and has an inverse.
+void require_invertible(const std::filesystem::path& path, const Eigen::Affine3d& transform,
+                        const std::string& is_what);
 
 struct NumberType {
   enum class Kind { signed_integer, unsigned_integer, real };
@@ -38,6 +46,22 @@ struct RawPlace {
 
 /// Reads at most `count` bytes. @throw std::runtime_error naming the file: it cannot be read, or its stream is damaged.
 std::vector<char, PageAllocator<char>> read_some(const RawPlace& place, std::size_t count);
+
+/// The lines of a header of text.
+struct HeaderLines {
+  std::filesystem::path path;
+  std::map<std::string, std::string> values;  ///< By name; those of lines with one name, with line ends between them.
+  std::uint64_t end = 0;                      ///< Offset of what follows the last line.
+
+  std::string text(const std::string& name) const;  ///< Empty if there is none.
+
+  /// The numbers between blanks or commas; `standard` if there is no such name.
+  /// @throw std::runtime_error naming the file and the name, if there is anything else.
+  std::vector<double> numbers(const std::string& name, std::vector<double> standard = {}) const;
+};
+
+/// Reads lines of a name, a separator and a value, up to one with the name `last`, in at most 4 MB of what `place` has.
+HeaderLines header_lines(const RawPlace& place, char separator, const std::string& last);
 
 /// Numbers of voxels.
 struct RawVoxels {

@@ -3,6 +3,7 @@
 /// The axes that programs of medical images refer the components of vectors and tensors to.
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,11 +17,8 @@ enum class ComponentFrame {
   fsl,     ///< The axes of the voxels, the first one reversed if the image is stored left to right. FSL.
 };
 
-/// The names that users can choose: "ras", "lps", "voxels", "fsl".
-const std::vector<std::string>& component_frame_names();
-
-/// @throw std::invalid_argument listing the names if `name` is unknown.
-ComponentFrame component_frame_of(const std::string& name);
+/// Those that users can choose, with their names: "ras", "lps", "voxels", "fsl".
+const std::vector<std::pair<std::string, ComponentFrame>>& component_frames();
 
 /// From the axes of the components to RAS, an orthogonal matrix: c in RAS = F c.
 /// @param to_ras  The linear part of the transform from voxel indices to RAS. If it shears, the axes of the voxels are

@@ -1,8 +1,6 @@
 #include "tools/import/lattices/component_names.h"
 
 #include <algorithm>
-#include <array>
-#include <utility>
 #include <vector>
 
 #include <vtkDataArray.h>
@@ -13,33 +11,7 @@
 namespace tensorray {
 namespace {
 
-/// The entry, or the one across the diagonal, that is not below it.
-int upper(int entry) {
-  const int row = entry / 3, column = entry % 3;
-  return row > column ? 3 * column + row : entry;
-}
-
-/// Where each entry of a sorted tensor is among the components; empty if their names do not tell all entries once.
-std::vector<int> places_of_entries(vtkDataArray& array) {
-  const bool is_full = array.GetNumberOfComponents() == 9;
-  const std::vector<int> entries = is_full ? std::vector{0, 1, 2, 3, 4, 5, 6, 7, 8} : std::vector{0, 4, 8, 1, 5, 2};
-  std::vector<int> places(entries.size(), -1);
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    const int named = entry_named(component_name(array, static_cast<int>(i)));
-    const auto entry = std::find(entries.begin(), entries.end(), is_full || named < 0 ? named : upper(named));
-    if (entry == entries.end()) return {};
-    places[static_cast<std::size_t>(entry - entries.begin())] = static_cast<int>(i);
-  }
-  return std::count(places.begin(), places.end(), -1) == 0 ? places : std::vector<int>();
-}
-
-}  // namespace
-
-std::string component_name(vtkDataArray& array, int component) {
-  const char* const name = array.GetComponentName(component);
-  return name ? name : "";
-}
-
+/// The entry of a tensor that the last two letters of a name tell; −1 if they tell none.
 int entry_named(const std::string& name) {
   if (name.size() < 2) return -1;
   int entry = 0;
@@ -51,25 +23,48 @@ int entry_named(const std::string& name) {
   return entry;
 }
 
-std::optional<TensorOrder> order_of_names(vtkDataArray& array) {
-  std::vector<int> entries;
-  const int count = array.GetNumberOfComponents() == 4 ? 4 : 6;
-  for (int i = 0; i < count; ++i) {
-    const int entry = entry_named(component_name(array, i));
-    entries.push_back(entry < 0 ? entry : upper(entry));
+/// Where each entry of a sorted tensor is among the components; empty if their names do not tell all entries once.
+std::vector<int> places_of_entries(vtkDataArray& array) {
+  const TensorOrder order = array.GetNumberOfComponents() == 9 ? TensorOrder::full : TensorOrder::vtk;
+  std::vector<int> places(entries_of(order).size(), -1);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const int position = named_position(component_name(array, static_cast<int>(i)), order);
+    if (position < 0) return {};
+    places[static_cast<std::size_t>(position)] = static_cast<int>(i);
   }
-  constexpr int xx = 0, xy = 1, xz = 2, yy = 4, yz = 5, zz = 8;
-  const std::pair<TensorOrder, std::vector<int>> orders[] = {
-      {TensorOrder::plane, {xx, yy, zz, xy}},
-      {TensorOrder::two_by_two, {xx, xy, xy, yy}},
-      {TensorOrder::vtk, {xx, yy, zz, xy, yz, xz}},
-      {TensorOrder::fsl, {xx, xy, xz, yy, yz, zz}},
-      {TensorOrder::mrtrix, {xx, yy, zz, xy, xz, yz}},
-      {TensorOrder::voigt, {xx, yy, zz, yz, xz, xy}},
-      {TensorOrder::lower_triangle, {xx, xy, yy, xz, yz, zz}},
-  };
-  for (const auto& [order, named] : orders)
-    if (entries == named) return order;
+  return std::count(places.begin(), places.end(), -1) == 0 ? places : std::vector<int>();
+}
+
+}  // namespace
+
+std::string component_name(vtkDataArray& array, int component) {
+  const char* const name = array.GetComponentName(component);
+  return name ? name : "";
+}
+
+void name_vtk_components(vtkDataArray& array) {
+  const char* const names[] = {"XX", "YY", "ZZ", "XY", "YZ", "XZ"};
+  for (int component = 0; component < 6; ++component) array.SetComponentName(component, names[component]);
+}
+
+int named_position(const std::string& name, TensorOrder order) {
+  const int named = entry_named(name);
+  const std::vector<int>& entries = entries_of(order);
+  const auto entry = std::find(entries.begin(), entries.end(), order == TensorOrder::full ? named : upper(named));
+  return named < 0 || entry == entries.end() ? -1 : static_cast<int>(entry - entries.begin());
+}
+
+std::optional<TensorOrder> order_of_names(vtkDataArray& array) {
+  const std::size_t count = array.GetNumberOfComponents() == 4 ? 4 : 6;
+  for (const auto& [name, order] : tensor_orders()) {
+    const std::vector<int>& entries = entries_of(order);
+    bool fits = entries.size() == count;
+    for (std::size_t i = 0; fits && i < count; ++i) {
+      const int named = entry_named(component_name(array, static_cast<int>(i)));
+      fits = named >= 0 && upper(named) == upper(entries[i]);
+    }
+    if (fits) return order;
+  }
   return {};
 }
 

@@ -144,8 +144,10 @@ TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& o
 }
 
 Matrix3d frame_of(const Lattice& lattice, TensorOrder order) {
-  if (order == TensorOrder::fsl) return lattice.fsl_frame.value_or(lattice.frame);
-  if (order == TensorOrder::lower_triangle) return lattice.lower_frame.value_or(lattice.frame);
+  const Matrix3d to_world = lattice.to_world.linear();
+  if (lattice.order_tells_frame && order == TensorOrder::fsl) return axes_of(ComponentFrame::fsl, to_world);
+  if (lattice.order_tells_frame && order == TensorOrder::lower_triangle)
+    return axes_of(ComponentFrame::voxels, to_world);
   return lattice.frame;
 }
 
@@ -171,8 +173,7 @@ void take_frame(Lattice& lattice, ComponentFrame frame) {
                                 " says itself in which axes its components are, or is not in an anatomical space: "
                                 "leave --frame out");
   lattice.frame = axes_of(frame, lattice.to_world.linear());
-  lattice.fsl_frame.reset();
-  lattice.lower_frame.reset();
+  lattice.order_tells_frame = false;
   lattice.frame_note.clear();
 }
 

@@ -23,9 +23,10 @@ struct Lattice {
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();  ///< From voxel indices (0 ...) to world; invertible.
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();     ///< From the axes of the components to world axes.
 
-  /// Replace `frame` if the order is `fsl`, or `lower_triangle`. FSL, dipy and MRtrix write the same kind of file, with
-  /// components in different axes. Only the order tells them apart, unless the user gives the frame.
-  std::optional<Eigen::Matrix3d> fsl_frame, lower_frame;
+  /// With the orders `fsl` and `lower_triangle`, components are in FSL's axes or in those of the voxels, not in
+  /// `frame`: FSL, dipy and MRtrix write the same kind of file. Only the order tells them apart, unless the user gives
+  /// the frame.
+  bool order_tells_frame = false;
   std::string frame_note;    ///< Where the file leaves `frame` open: how it was taken, for the user.
   bool takes_frame = false;  ///< World is RAS and the file does not state `frame`: the user may (take_frame).
 

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -11,24 +12,24 @@
 namespace tensorray {
 
 enum class TensorOrder {
-  plane,           ///< Four, of a plane: xx yy zz xy; the others are zero. Ansys, Abaqus, CalculiX.
-  two_by_two,      ///< Four, of a plane: xx xy yx yy; the others are zero.
-  full,            ///< Nine: xx xy xz yx yy yz zx zy zz, row by row.
   vtk,             ///< Six: xx yy zz xy yz xz. VTK, ParaView, Ansys, CalculiX.
   fsl,             ///< Six: xx xy xz yy yz zz. FSL, NRRD. OpenFOAM's files also use it, but VTK converts them to `vtk`.
   mrtrix,          ///< Six: xx yy zz xy xz yz. MRtrix.
   voigt,           ///< Six: xx yy zz yz xz xy. Continuum mechanics.
   lower_triangle,  ///< Six: xx xy yy xz yz zz. NIfTI with the intent "symmetric matrix" (ITK, ANTs), dipy, AFNI.
+  plane,           ///< Four, of a plane: xx yy zz xy; the others are zero. Ansys, Abaqus, CalculiX.
+  two_by_two,      ///< Four, of a plane: xx xy yx yy; the others are zero.
+  full,            ///< Nine: xx xy xz yx yy yz zx zy zz, row by row.
 };
 
-/// The names that users can choose: "vtk", "fsl", "mrtrix", "voigt", "lower", "plane", "2x2".
-const std::vector<std::string>& tensor_order_names();
+/// The orders that users can choose, with their names: "vtk", "fsl", "mrtrix", "voigt", "lower", "plane", "2x2".
+const std::vector<std::pair<std::string, TensorOrder>>& tensor_orders();
 
-/// @throw std::invalid_argument listing the names if `name` is unknown.
-TensorOrder tensor_order_of(const std::string& name);
+/// The entry of a tensor, 3 · row + column, of each component.
+const std::vector<int>& entries_of(TensorOrder order);
 
-/// The number of components: nine, six or four.
-int component_count(TensorOrder order);
+/// An entry, or the one across the diagonal, that is not below it.
+inline int upper(int entry) { return entry / 3 > entry % 3 ? 3 * (entry % 3) + entry / 3 : entry; }
 
 /// The order of an array of four, six, nine or more components.
 /// @param said  What the file says of it. @param given  What the user says. @param what  The array, for messages.
@@ -36,7 +37,7 @@ int component_count(TensorOrder order);
 TensorOrder chosen_order(int components, const std::optional<TensorOrder>& said,
                          const std::optional<TensorOrder>& given, const std::string& what);
 
-/// The tensor with component_count(order) components. Six components make a symmetric tensor.
+/// The tensor of as many components as the order has entries. Six components make a symmetric tensor.
 Eigen::Matrix3d tensor_of(const double* components, TensorOrder order);
 
 }  // namespace tensorray

@@ -1,7 +1,6 @@
 #include "tools/import/meshes/component_arrays.h"
 
 #include <algorithm>
-#include <array>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -16,6 +15,7 @@
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 
+#include "base/text/text.h"
 #include "tools/import/lattices/component_names.h"
 
 namespace tensorray {
@@ -27,9 +27,7 @@ Names names_in(const std::string& list) {
   Names names;
   std::istringstream stream(list + ",");  // getline drops an empty name at the end
   for (std::string name; std::getline(stream, name, ',');) {
-    name.erase(name.find_last_not_of(' ') + 1);
-    name.erase(0, name.find_first_not_of(' '));
-    names.push_back(name);
+    names.push_back(trimmed(name));
   }
   return names;
 }
@@ -147,18 +145,10 @@ vtkSmartPointer<vtkDataArray> joined_in_order(const std::vector<Part>& parts, Ta
   return joined;
 }
 
-/// The position in VTK's order of the component that the last two letters of a name tell; −1 if they tell none of a
-/// plane.
-int plane_position(const std::string& name) {
-  constexpr std::array positions{0, 3, -1, 3, 1, -1, -1, -1, 2};  // Of xx, xy, ..., zz.
-  const int entry = entry_named(name);
-  return entry < 0 ? -1 : positions[static_cast<std::size_t>(entry)];
-}
-
 /// The components xx, yy, xy, and perhaps zz, of a tensor in the plane of x and y, in VTK's order; the others are zero.
 vtkSmartPointer<vtkDataArray> joined_of_plane(vtkDataSet& mesh, const std::vector<Part>& parts) {
   std::vector<int> positions;
-  for (const Part& part : parts) positions.push_back(plane_position(name_of(part)));
+  for (const Part& part : parts) positions.push_back(named_position(name_of(part), TensorOrder::vtk));
   for (const int needed : {0, 1, 3, parts.size() == 4 ? 2 : 0})
     if (std::count(positions.begin(), positions.end(), needed) != 1)
       throw std::invalid_argument(
@@ -167,8 +157,7 @@ vtkSmartPointer<vtkDataArray> joined_of_plane(vtkDataSet& mesh, const std::vecto
                       parts.size(), list_of_arrays(mesh)));
   vtkSmartPointer<vtkDataArray> joined = new_array(parts, 6, Take::tensor);
   joined->Fill(0);
-  constexpr const char* vtk_names[] = {"XX", "YY", "ZZ", "XY", "YZ", "XZ"};
-  for (int i = 0; i < 6; ++i) joined->SetComponentName(i, vtk_names[i]);
+  name_vtk_components(*joined);
   for (std::size_t i = 0; i < parts.size(); ++i)
     joined->CopyComponent(positions[i], parts[i].array, parts[i].component);
   return joined;

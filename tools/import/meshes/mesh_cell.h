@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/meshes/mesh_cell.h
-/// A cell of a mesh, and its interpolation at a point in space. Private to the importer.
+/// A cell of a mesh, and its interpolation at a point in space.
 
 #include <array>
 #include <cstddef>

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/meshes/mesh_solid.h
-/// The three-dimensional part of a mesh. Private to the importer.
+/// The three-dimensional part of a mesh.
 
 #include <vector>
 

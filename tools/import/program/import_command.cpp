@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -49,6 +50,14 @@ struct ImportOptions {
   bool half = false, quiet = false, tells_progress = false;
 };
 
+/// What a name stands for; CLI11 has checked that there is such a name.
+template <class Value>
+std::optional<Value> named(const std::string& name, const std::vector<std::pair<std::string, Value>>& table) {
+  for (const auto& [text, value] : table)
+    if (text == name) return value;
+  return {};
+}
+
 ImportSettings settings_of(const ImportOptions& options) {
   ImportSettings settings = options.settings;
   settings.array = options.array;
@@ -60,8 +69,8 @@ ImportSettings settings_of(const ImportOptions& options) {
     settings.array = options.strain_of;
     settings.take = Take::strain;
   }
-  if (!options.order.empty()) settings.order = tensor_order_of(options.order);
-  if (!options.frame.empty()) settings.frame = component_frame_of(options.frame);
+  settings.order = named(options.order, tensor_orders());
+  settings.frame = named(options.frame, component_frames());
   if (options.cells == "constant") settings.cell_values = CellValues::constant;
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
@@ -257,7 +266,7 @@ void add_what(CLI::App& command, ImportOptions& options) {
           "--order", options.order,
           "Order of six components: vtk (xx yy zz xy yz xz), fsl (xx xy xz yy yz zz), mrtrix (xx yy zz xy xz "
           "yz), voigt (xx yy zz yz xz xy), lower (xx xy yy xz yz zz); of four: plane (xx yy zz xy), 2x2 (xx xy yx yy)")
-      ->check(CLI::IsMember(tensor_order_names()))
+      ->check(CLI::IsMember(tensor_orders()))
       ->option_text("ORDER");
   command
       .add_option("--frame", options.frame,
@@ -265,7 +274,7 @@ void add_what(CLI::App& command, ImportOptions& options) {
                   "lps (displacements of "
                   "ITK and ANTs), voxels (tensors of ANTs and dipy), fsl (voxels, with FSL's flip); default: those of "
                   "--order fsl and lower, else ras (MetaImage: lps; NRRD: its space)")
-      ->check(CLI::IsMember(component_frame_names()))
+      ->check(CLI::IsMember(component_frames()))
       ->option_text("FRAME");
   command
       .add_option("--cells", options.cells,

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/sampling/cell_parts.h
-/// Divides a cell into small parts, for sums over its volume. Private to the importer.
+/// Divides a cell into small parts, for sums over its volume.
 
 #include <functional>
 #include <vector>

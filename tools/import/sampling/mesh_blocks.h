@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/sampling/mesh_blocks.h
-/// Fills the blocks of a grid from the cells of a mesh. Private to the importer.
+/// Fills the blocks of a grid from the cells of a mesh.
 
 #include "base/process/progress.h"
 #include "tools/import/meshes/mesh_solid.h"

@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 #include <vtkDataSet.h>
 
+#include "base/overloaded.h"
 #include "tools/import/meshes/mesh_cell.h"
 
 namespace tensorray {
@@ -91,28 +92,31 @@ SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const Sam
   if (settings.flat_axis >= 0) edges[settings.flat_axis] = 0;
   const double longest = edges.maxCoeff();
   Vector3d size;
-  if (const auto* counts = std::get_if<Vector3i>(&settings.resolution)) {
-    size = counts->cast<double>();
-    if (settings.flat_axis >= 0) size[settings.flat_axis] = 2;  // Whatever is given: there is one.
-    require_two(static_cast<int>(size.minCoeff()));
-    lattice.voxel = box.sizes().array() / (size.array() - 1);
-  } else {
-    double voxel = 0;
-    if (const auto* count = std::get_if<int>(&settings.resolution)) {
-      require_two(*count);
-      voxel = longest / (*count - 1);
-    } else if (const auto* given = std::get_if<double>(&settings.resolution)) {
-      voxel = *given;
-      if (!(voxel > 0) || voxel > longest * rounded_one)
-        throw std::invalid_argument(
-            fmt::format("--voxel-size {}: it must be greater than 0 and at most the longest edge of the bounds, {:.6g}",
-                        voxel, longest));
-    } else {
-      voxel = chosen_voxel(mesh, solid, box);
-    }
+  const auto set_voxel = [&](double voxel) {
     size = voxels_along(box.sizes(), voxel);
     lattice.voxel.setConstant(voxel);
-  }
+  };
+  std::visit(Overloaded{[&](std::monostate) { set_voxel(chosen_voxel(mesh, solid, box)); },
+                        [&](int count) {
+                          require_two(count);
+                          set_voxel(longest / (count - 1));
+                        },
+                        [&](double voxel) {
+                          if (!(voxel > 0) || voxel > longest * rounded_one)
+                            throw std::invalid_argument(
+                                fmt::format("--voxel-size {}: it must be greater than 0 and at most the longest edge "
+                                            "of the bounds, {:.6g}",
+                                            voxel, longest));
+                          set_voxel(voxel);
+                        },
+                        [&](const Vector3i& counts) {
+                          size = counts.cast<double>();
+                          if (settings.flat_axis >= 0)
+                            size[settings.flat_axis] = 2;  // Whatever is given: there is one.
+                          require_two(static_cast<int>(size.minCoeff()));
+                          lattice.voxel = box.sizes().array() / (size.array() - 1);
+                        }},
+             settings.resolution);
   if (const int flat = settings.flat_axis; flat >= 0) size[flat] = 1, lattice.voxel[flat] = box.sizes()[flat];
   if (size.prod() > max_voxels)
     throw std::invalid_argument(

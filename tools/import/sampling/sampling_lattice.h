@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/sampling/sampling_lattice.h
-/// The lattice of voxels at which a mesh is sampled. Private to the importer.
+/// The lattice of voxels at which a mesh is sampled.
 
 #include <Eigen/Geometry>
 

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/sampling/voxel_average.h
-/// The average of a tensor field over the part of a voxel that a mesh fills. Private to the importer.
+/// The average of a tensor field over the part of a voxel that a mesh fills.
 
 #include <Eigen/Core>
 

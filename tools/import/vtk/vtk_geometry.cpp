@@ -25,7 +25,7 @@ namespace {
 
 using Path = std::filesystem::path;
 
-[[noreturn]] void fail(const Path& path, const std::string& what) {
+[[noreturn]] void fail_form(const Path& path, const std::string& what) {
   throw std::runtime_error(path.string() + ": is damaged, or not of the form it seems: " + what + "; write it again");
 }
 
@@ -37,7 +37,7 @@ void check_coordinates(const Path& path, const std::string& name, vtkDataArray* 
   for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i) {
     for (int axis = 0; axis < values->GetNumberOfComponents(); ++axis) {
       if (is_coordinate(values->GetComponent(i, axis))) continue;
-      fail(path, name + " " + std::to_string(i) + " is not finite, or beyond 1e30");
+      fail_form(path, name + " " + std::to_string(i) + " is not finite, or beyond 1e30");
     }
   }
 }
@@ -48,12 +48,12 @@ void check_image(const Path& path, vtkImageData& image) {
       std::all_of(image.GetOrigin(), image.GetOrigin() + 3, is_coordinate) &&
       std::all_of(bounds, bounds + 6, is_coordinate))
     return;
-  fail(path, "its origin or spacing is not finite, or beyond 1e30");
+  fail_form(path, "its origin or spacing is not finite, or beyond 1e30");
 }
 
 /// A legacy file may hold fewer points or coordinates than its dimensions announce.
 void check_count(const Path& path, const std::string& name, vtkIdType count, vtkIdType needed) {
-  if (count < needed) fail(path, "it has " + std::to_string(count) + " of " + std::to_string(needed) + " " + name);
+  if (count < needed) fail_form(path, "it has " + std::to_string(count) + " of " + std::to_string(needed) + " " + name);
 }
 
 void check_rectilinear(const Path& path, vtkRectilinearGrid& grid) {
@@ -89,7 +89,7 @@ void check_faces(const Path& path, vtkUnstructuredGrid& grid) {
     const auto next = [&](vtkIdType limit) {
       const vtkIdType value = at >= 0 && at < faces->GetNumberOfValues() ? faces->GetValue(at++) : -1;
       if (value < 0 || value >= limit)
-        fail(path, "the faces of cell " + std::to_string(id) + " have points that are not there");
+        fail_form(path, "the faces of cell " + std::to_string(id) + " have points that are not there");
       return value;
     };
     for (vtkIdType face = next(VTK_ID_MAX); face > 0; --face)
@@ -118,47 +118,45 @@ void check_types(const Path& path, vtkUnstructuredGrid& grid) {
   }
 }
 
-/// The order of a Lagrange or Bézier cell whose number of points is `count(order)`; 0 if there is none up to VTK's
-/// limit.
-int order_of(vtkIdType points, vtkIdType (*count)(vtkIdType)) {
-  constexpr int most = 10;
-  for (int order = 1; order <= most; ++order)
-    if (count(order) == points) return order;
-  return 0;
+/// The number of points of a Lagrange or Bézier cell with these degrees along its axes; 0 for other types, −1 if there
+/// is no such cell.
+double points_of(int type, const std::array<double, 3>& degrees) {
+  const auto [x, y, z] = degrees;
+  if (!(x >= 1 && y >= 1 && z >= 1)) return -1;
+  switch (type) {
+    case VTK_LAGRANGE_TETRAHEDRON:
+    case VTK_BEZIER_TETRAHEDRON:
+      return x == y && y == z ? (x + 1) * (x + 2) * (x + 3) / 6 : -1;
+    case VTK_LAGRANGE_HEXAHEDRON:
+    case VTK_BEZIER_HEXAHEDRON:
+      return (x + 1) * (y + 1) * (z + 1);
+    case VTK_LAGRANGE_WEDGE:
+      return (x + 1) * (x + 2) / 2 * (z + 1);
+    default:
+      return 0;
+  }
 }
 
 /// VTK takes the order of a cell from its number of points, or from an array of degrees, and reads that many points.
 void check_order(const Path& path, vtkUnstructuredGrid& grid, vtkIdType id, vtkIdType points) {
-  vtkIdType (*count)(vtkIdType) = nullptr;
-  switch (grid.GetCellType(id)) {
-    case VTK_LAGRANGE_TETRAHEDRON:
-    case VTK_BEZIER_TETRAHEDRON:
-      count = [](vtkIdType n) { return (n + 1) * (n + 2) * (n + 3) / 6; };
-      break;
-    case VTK_LAGRANGE_HEXAHEDRON:
-    case VTK_BEZIER_HEXAHEDRON:
-      count = [](vtkIdType n) { return (n + 1) * (n + 1) * (n + 1); };
-      break;
-    case VTK_LAGRANGE_WEDGE:
-      if (points == 21) return;  // With a point in the middle of each face.
-      count = [](vtkIdType n) { return (n + 1) * (n + 1) * (n + 2) / 2; };
-      break;
-    default:
-      return;
-  }
+  const int type = grid.GetCellType(id);
+  if (points_of(type, {1, 1, 1}) == 0) return;
+  if (type == VTK_LAGRANGE_WEDGE && points == 21) return;  // With a point in the middle of each face.
   vtkDataArray* const degrees = grid.GetCellData()->GetHigherOrderDegrees();
-  if (!degrees && order_of(points, count) > 0) return;
-  double degree[3] = {0, 0, 0};
-  if (degrees && degrees->GetNumberOfComponents() == 3) degrees->GetTuple(id, degree);
-  const bool is_box = count(1) == 8;
-  const double needed = is_box ? (degree[0] + 1) * (degree[1] + 1) * (degree[2] + 1)
-                               : (degree[0] + 1) * (degree[0] + 2) / 2 * (degree[2] + 1);
-  const bool is_tetrahedron = count(1) == 4;
-  const bool same = degree[0] == degree[1] && degree[1] == degree[2];
-  if (is_tetrahedron && same && order_of(points, count) == degree[0] && degree[0] > 0) return;
-  if (!is_tetrahedron && degree[0] >= 1 && degree[2] >= 1 && needed == static_cast<double>(points)) return;
-  fail(path,
-       "cell " + std::to_string(id) + " has " + std::to_string(points) + " points, which fit no order of its type");
+  std::array<double, 3> degree{};
+  bool fits = false;
+  constexpr int max_order = 10;  // VTK's.
+  for (int order = 1; !degrees && !fits && order <= max_order; ++order) {
+    degree.fill(order);
+    fits = points_of(type, degree) == static_cast<double>(points);
+  }
+  if (degrees && degrees->GetNumberOfComponents() == 3) {
+    degrees->GetTuple(id, degree.data());
+    fits = points_of(type, degree) == static_cast<double>(points);
+  }
+  if (!fits)
+    fail_form(path, "cell " + std::to_string(id) + " has " + std::to_string(points) +
+                        " points, which fit no order of its type");
 }
 
 /// VTK does not check the point indices of cells.
@@ -168,13 +166,13 @@ void check_cells(const Path& path, vtkUnstructuredGrid& grid) {
   vtkDataArray& ids = *grid.GetCells()->GetConnectivityArray();
   const vtkUnsignedCharArray* const types = grid.GetCellTypesArray();
   const vtkIdType cells = grid.GetNumberOfCells();
-  if (!types || types->GetNumberOfValues() < cells) fail(path, "it has fewer types of cells than cells");
+  if (!types || types->GetNumberOfValues() < cells) fail_form(path, "it has fewer types of cells than cells");
   check_types(path, grid);
   for (vtkIdType id = 0; id < cells; ++id) {
     const auto begin = static_cast<vtkIdType>(offsets.GetComponent(id, 0));
     const auto end = static_cast<vtkIdType>(offsets.GetComponent(id + 1, 0));
     if (begin < 0 || end < begin || end > ids.GetNumberOfValues() || end - begin < least[types->GetValue(id)])
-      fail(path, "cell " + std::to_string(id) + " has fewer points than its type needs, or a wrong offset");
+      fail_form(path, "cell " + std::to_string(id) + " has fewer points than its type needs, or a wrong offset");
     check_order(path, grid, id, end - begin);
   }
   double range[2] = {0, 0};
@@ -182,7 +180,7 @@ void check_cells(const Path& path, vtkUnstructuredGrid& grid) {
   const vtkIdType points = grid.GetNumberOfPoints();
   if (range[0] < 0 || (ids.GetNumberOfValues() > 0 && range[1] >= static_cast<double>(points))) {
     const auto wrong = static_cast<vtkIdType>(range[0] < 0 ? range[0] : range[1]);
-    fail(path, "a cell has point " + std::to_string(wrong) + " of " + std::to_string(points) + " (from 0)");
+    fail_form(path, "a cell has point " + std::to_string(wrong) + " of " + std::to_string(points) + " (from 0)");
   }
   check_faces(path, grid);
 }

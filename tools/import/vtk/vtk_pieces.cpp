@@ -18,7 +18,7 @@
 #include <vtkDataSetAttributes.h>
 #include <vtkIdList.h>
 #include <vtkImageData.h>
-#include <vtkMatrix3x3.h>
+#include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkRectilinearGrid.h>
@@ -227,12 +227,9 @@ std::set<std::string> point_arrays(vtkDataSet& piece) {
 }
 
 bool is_same_image(vtkImageData& a, vtkImageData& b) {
-  const auto is_equal = [](const auto* one, const auto* other, int count) {
-    return std::equal(one, one + count, other);
-  };
-  return is_equal(a.GetExtent(), b.GetExtent(), 6) && is_equal(a.GetOrigin(), b.GetOrigin(), 3) &&
-         is_equal(a.GetSpacing(), b.GetSpacing(), 3) &&
-         is_equal(a.GetDirectionMatrix()->GetData(), b.GetDirectionMatrix()->GetData(), 9);
+  const double *const of_a = a.GetIndexToPhysicalMatrix()->GetData(), *const of_b =
+                                                                          b.GetIndexToPhysicalMatrix()->GetData();
+  return std::equal(a.GetExtent(), a.GetExtent() + 6, b.GetExtent()) && std::equal(of_a, of_a + 16, of_b);
 }
 
 bool is_same_grid(vtkRectilinearGrid& a, vtkRectilinearGrid& b) {

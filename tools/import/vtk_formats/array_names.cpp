@@ -15,14 +15,13 @@
 #include <vtk_exodusII.h>
 
 #include "base/text/text.h"
+#include "tools/import/lattices/component_names.h"
 
 namespace tensorray {
 namespace {
 
 void name_six(vtkDataArray* array) {
-  if (!array || array->GetNumberOfComponents() != 6 || array->HasAComponentName()) return;
-  const char* const names[] = {"XX", "YY", "ZZ", "XY", "YZ", "XZ"};
-  for (int component = 0; component < 6; ++component) array->SetComponentName(component, names[component]);
+  if (array && array->GetNumberOfComponents() == 6 && !array->HasAComponentName()) name_vtk_components(*array);
 }
 
 /// A name as legacy files write it: %20 is a space.

@@ -1,7 +1,6 @@
 #pragma once
 /// @file tools/import/vtk_formats/vtk_tags.h
-/// The tags of VTK's XML files, without a parser: files may be large, and have bytes between tags. Private to the
-/// importer.
+/// The tags of VTK's XML files, without a parser: files may be large, and have bytes between tags.
 
 #include <algorithm>
 #include <cstdlib>
@@ -26,12 +25,6 @@ inline std::string attribute(const std::string& text, const std::string& name, s
 inline std::string attribute(const std::string& text, const std::string& name) {
   std::size_t from = 0;
   return attribute(text, name, from);
-}
-
-/// What reading a file may take at most, bytes: a small one may announce any number of points. (LZMA makes 7000 bytes
-/// of one; threads have stacks.)
-inline double max_memory_of(const std::filesystem::path& path) {
-  return 0x1p30 + 8000.0 * static_cast<double>(std::filesystem::file_size(path));
 }
 
 /// Whether a tag of an array, or any other, announces a number of components that VTK can take time and memory for.

@@ -1,5 +1,3 @@
-#include <charconv>
-#include <cstdint>
 #include <map>
 #include <new>
 #include <optional>
@@ -18,6 +16,7 @@
 
 #include "base/process/process_limits.h"
 #include "base/text/text.h"
+#include "tools/import/vtk/mesh_file.h"
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk_formats/vtk_tags.h"
 #include "tools/import/vtk_formats/vtp_files.h"
@@ -38,28 +37,13 @@ struct Tags {
   std::map<std::string, int> arrays;  ///< How many have a name.
 };
 
-/// VTK takes a count that it cannot read for 0, and leaves out what it counts.
-void check_counts(const std::string& piece) {
-  for (const char* name : {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys"}) {
-    if (piece.find(name) == std::string::npos) continue;
-    const std::string text = attribute(piece, name);
-    std::int64_t count = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-    if (error != std::errc() || count < 0 || end != text.data() + text.size())
-      fail_damaged(std::string("its ") + name + " is no count");
-  }
-}
-
 /// VTK's message about a file of another kind does not help the user.
 Tags read_tags(const Path& path) {
   Tags tags;
   std::optional<std::string> type;
   for_each_tag(path, [&](const std::string& tag) {
     if (starts_with(tag, "VTKFile")) type = attribute(tag, "type");
-    if (starts_with(tag, "Piece")) {
-      ++tags.pieces;
-      check_counts(tag);
-    }
+    if (starts_with(tag, "Piece")) ++tags.pieces;
     if (starts_with(tag, "DataArray")) ++tags.arrays[attribute(tag, "Name")];
     if (!has_possible_components(tag)) fail_damaged("one of its arrays has no such number of components");
   });

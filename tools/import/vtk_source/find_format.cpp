@@ -181,7 +181,6 @@ const MeshFormat& checked_format(const fs::path& path) {
         fail(path, "is damaged: one of its arrays has no such number of components; copy or write it again");
     });
   if (found->is_in_pieces()) check_pieces(path, *found);
-  if (found->check) found->check(path);
   return *found;
 }
 

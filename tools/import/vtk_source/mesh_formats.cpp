@@ -35,132 +35,115 @@
 #include "tools/import/vtk_formats/array_names.h"
 #include "tools/import/vtk_formats/netcdf_end.h"
 #include "tools/import/vtk_formats/vtk_tags.h"
-#include "tools/import/vtk_source/vtk_collection.h"
 
 namespace tensorray {
 namespace {
 
 using Path = std::filesystem::path;
 
-vtkSmartPointer<vtkDataObject> read_xml(const Path& path, int) {
+vtkSmartPointer<vtkDataObject> read_xml(const Path& path) {
   vtkNew<vtkXMLGenericDataObjectReader> reader;
   reader->SetFileName(path.c_str());
   reader->Update();
   return reader->GetOutputDataObject(0);
 }
 
+MeshFile open_xml(const Path& path) {
+  return {1, [path](int) { return read_xml(path); }};
+}
+
 /// Reads piece by piece, because VTK's own reader of pieces duplicates the points on every seam.
-vtkSmartPointer<vtkDataObject> read_unstructured_pieces(const Path& path, int) {
-  auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();
-  unsigned int index = 0;
-  for (const Path& piece : piece_files(path)) blocks->SetBlock(index++, read_xml(piece, 0));
-  return blocks;
+MeshFile open_unstructured_pieces(const Path& path) {
+  return {1, [path](int) {
+            auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+            unsigned int index = 0;
+            for (const Path& piece : piece_files(path)) blocks->SetBlock(index++, read_xml(piece));
+            return blocks;
+          }};
 }
 
-/// Requests all arrays of each kind; by default VTK reads only the first one.
-vtkSmartPointer<vtkDataObject> read_legacy(const Path& path, int) {
-  vtkNew<vtkDataSetReader> reader;
-  reader->SetFileName(path.c_str());
-  reader->ReadAllScalarsOn();
-  reader->ReadAllVectorsOn();
-  reader->ReadAllNormalsOn();
-  reader->ReadAllTensorsOn();
-  reader->ReadAllFieldsOn();
-  reader->Update();
-  for (vtkDataSet* const set : data_sets_in(reader->GetOutputDataObject(0))) name_tensors6(*set, path);
-  return reader->GetOutputDataObject(0);
-}
-
-/// The title, on the second line, may be any text.
+/// Finds what VTK reads in silence, or for hours. The title, on the second line, may be any text.
 void check_legacy(const Path& path) {
-  std::string head(4096, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(file.gcount()));
-  std::size_t position = head.find('\n');
-  if (position != std::string::npos) position = head.find('\n', position + 1);
-  const std::size_t start = position == std::string::npos ? position : head.find("DATASET", position);
-  if (start == std::string::npos) fail(path, "is cut off, or no data set: it has no line DATASET ...");
-  const std::string line = head.substr(start, head.find_first_of("\r\n", start) - start);
-  if (line.find("POLYDATA") != std::string::npos)
-    fail(path, "holds surfaces (POLYDATA), which have no volume to import; save the volume's grid");
+  std::string data_set;
   int number = 0;
-  for_each_short_line(path, 254, [&](const std::string& text) {
+  for_each_short_line(path, 254, [&](const std::string& line) {
     if (++number <= 2) return true;
-    std::istringstream words(text);
+    std::istringstream words(line);
     std::string keyword, name;
     double count = 0;
     words >> keyword >> name >> count;
+    if (lower_case(keyword) == "dataset" && data_set.empty()) data_set = lower_case(name);
     if (lower_case(keyword) == "field" && count > static_cast<double>(std::filesystem::file_size(path)))
-      fail(path, "is damaged or cut off: it announces \"" + escaped(text) +
+      fail(path, "is damaged or cut off: it announces \"" + escaped(line) +
                      "\", and VTK would look for so many arrays; copy or write it again");
     return true;
   });
+  if (data_set.empty()) fail(path, "is cut off, or no data set: it has no line DATASET ...");
+  if (data_set == "polydata")
+    fail(path, "holds surfaces (POLYDATA), which have no volume to import; save the volume's grid");
+}
+
+/// Requests all arrays of each kind; by default VTK reads only the first one.
+MeshFile open_legacy(const Path& path) {
+  check_legacy(path);
+  return {1, [path](int) -> vtkSmartPointer<vtkDataObject> {
+            vtkNew<vtkDataSetReader> reader;
+            reader->SetFileName(path.c_str());
+            reader->ReadAllScalarsOn();
+            reader->ReadAllVectorsOn();
+            reader->ReadAllNormalsOn();
+            reader->ReadAllTensorsOn();
+            reader->ReadAllFieldsOn();
+            reader->Update();
+            for (vtkDataSet* const set : data_sets_in(reader->GetOutputDataObject(0))) name_tensors6(*set, path);
+            return reader->GetOutputDataObject(0);
+          }};
 }
 
 /// Reads the undisplaced mesh. By default VTK moves its points by any array that looks like a displacement.
-vtkSmartPointer<vtkDataObject> read_exodus(const Path& path, int step) {
-  vtkNew<vtkExodusIIReader> reader;
+MeshFile open_exodus(const Path& path) {
+  require_whole_netcdf(path);
+  const auto reader = vtkSmartPointer<vtkExodusIIReader>::New();
   reader->SetFileName(path.c_str());
   reader->ApplyDisplacementsOff();
   reader->UpdateInformation();
-  for (const auto kind : {vtkExodusIIReader::NODAL, vtkExodusIIReader::ELEM_BLOCK})
-    for (int i = 0; i < reader->GetNumberOfObjectArrays(kind); ++i)
-      reader->SetObjectArrayStatus(kind, reader->GetObjectArrayName(kind, i), 1);
-  for (int i = 0; i < reader->GetNumberOfObjects(vtkExodusIIReader::ELEM_BLOCK); ++i)
-    reader->SetObjectStatus(vtkExodusIIReader::ELEM_BLOCK, i, 1);
-  if (reader->GetNumberOfTimeSteps() > 0) reader->SetTimeStep(step);
-  reader->Update();
-  for (vtkDataSet* const set : data_sets_in(reader->GetOutputDataObject(0))) name_components(*set, *reader, path);
-  return reader->GetOutputDataObject(0);
-}
-
-int exodus_steps(const Path& path) {
-  vtkNew<vtkExodusIIReader> reader;
-  reader->SetFileName(path.c_str());
-  reader->UpdateInformation();
-  return reader->GetNumberOfTimeSteps();
-}
-
-/// The times of a CGNS file, in order; none if it has no results in time.
-std::vector<double> open_cgns(const Path& path, vtkCGNSReader& reader) {
-  if (!reader.CanReadFile(path.c_str())) fail(path, "is damaged or cut off, or no CGNS file; copy or write it again");
-  reader.SetFileName(path.c_str());
-  reader.SetDoublePrecisionMesh(1);
-  reader.UpdateInformation();
-  vtkInformation& facts = *reader.GetOutputInformation(0);
-  std::vector<double> times(
-      static_cast<std::size_t>(std::max(0, facts.Length(vtkStreamingDemandDrivenPipeline::TIME_STEPS()))));
-  if (!times.empty()) facts.Get(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), times.data());
-  return times;
+  const int steps = reader->GetNumberOfTimeSteps();
+  return {steps, [=](int step) -> vtkSmartPointer<vtkDataObject> {
+            for (const auto kind : {vtkExodusIIReader::NODAL, vtkExodusIIReader::ELEM_BLOCK})
+              for (int i = 0; i < reader->GetNumberOfObjectArrays(kind); ++i)
+                reader->SetObjectArrayStatus(kind, reader->GetObjectArrayName(kind, i), 1);
+            for (int i = 0; i < reader->GetNumberOfObjects(vtkExodusIIReader::ELEM_BLOCK); ++i)
+              reader->SetObjectStatus(vtkExodusIIReader::ELEM_BLOCK, i, 1);
+            if (steps > 0) reader->SetTimeStep(step);
+            reader->Update();
+            for (vtkDataSet* const set : data_sets_in(reader->GetOutputDataObject(0)))
+              name_components(*set, *reader, path);
+            return reader->GetOutputDataObject(0);
+          }};
 }
 
 /// Only volumes, with all arrays. By default VTK reads none.
-vtkSmartPointer<vtkDataObject> read_cgns(const Path& path, int step) {
-  vtkNew<vtkCGNSReader> reader;
-  const std::vector<double> times = open_cgns(path, *reader);
-  reader->LoadBndPatchOff();
-  reader->EnableAllBases();
-  reader->EnableAllFamilies();
-  reader->EnableAllPointArrays();
-  reader->EnableAllCellArrays();
-  if (!times.empty()) reader->UpdateTimeStep(times[static_cast<std::size_t>(step)]);
-  reader->Update();
-  return reader->GetOutputDataObject(0);
+MeshFile open_cgns(const Path& path) {
+  const auto reader = vtkSmartPointer<vtkCGNSReader>::New();
+  if (!reader->CanReadFile(path.c_str())) fail(path, "is damaged or cut off, or no CGNS file; copy or write it again");
+  reader->SetFileName(path.c_str());
+  reader->SetDoublePrecisionMesh(1);
+  reader->UpdateInformation();
+  auto* const time_steps = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
+  vtkInformation& facts = *reader->GetOutputInformation(0);
+  std::vector<double> times(static_cast<std::size_t>(std::max(0, facts.Length(time_steps))));
+  if (!times.empty()) facts.Get(time_steps, times.data());
+  return {static_cast<int>(times.size()), [=](int step) -> vtkSmartPointer<vtkDataObject> {
+            reader->LoadBndPatchOff();
+            reader->EnableAllBases();
+            reader->EnableAllFamilies();
+            reader->EnableAllPointArrays();
+            reader->EnableAllCellArrays();
+            if (!times.empty()) reader->UpdateTimeStep(times[static_cast<std::size_t>(step)]);
+            reader->Update();
+            return reader->GetOutputDataObject(0);
+          }};
 }
-
-int cgns_steps(const Path& path) { return static_cast<int>(open_cgns(path, *vtkNew<vtkCGNSReader>()).size()); }
-
-/// The folder of the case of a path, which is that folder, a .foam file in it, or its system/controlDict.
-OpenFoamParts parts_of(const Path& path) {
-  const Path parent = std::filesystem::absolute(path).parent_path();
-  if (std::filesystem::is_directory(path)) return openfoam_parts(path, path);
-  return openfoam_parts(path, path.filename() == "controlDict" ? parent.parent_path() : parent);
-}
-
-void check_openfoam(const Path& path) { parts_of(path); }
-
-int openfoam_steps(const Path& path) { return static_cast<int>(parts_of(path).times.size()); }
 
 /// The name of a block; empty if it has none.
 std::string block_name(vtkMultiBlockDataSet& blocks, unsigned int index) {
@@ -201,9 +184,7 @@ vtkSmartPointer<vtkMultiBlockDataSet> read_case(const Path& folder, const OpenFo
 }
 
 /// The regions, which share no points; of a decomposed case, each of the parts of all processors.
-vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, int step) {
-  const OpenFoamParts parts = parts_of(path);
-  const OpenFoamTime& time = parts.times[static_cast<std::size_t>(step)];
+vtkSmartPointer<vtkDataObject> read_regions(const OpenFoamParts& parts, const OpenFoamTime& time) {
   const TemporaryFolder folder;
   std::map<std::string, DataSets> regions;  // A processor may have no part of a region.
   for (const Path& one :
@@ -211,7 +192,7 @@ vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, int step) {
     const vtkSmartPointer<vtkMultiBlockDataSet> blocks = read_case(one, time);
     for (unsigned int i = 0; i < blocks->GetNumberOfBlocks(); ++i)
       for (const auto& set : data_sets_in(blocks->GetBlock(i))) {
-        check_geometry(*set, path);
+        check_geometry(*set, parts.folder);
         regions[block_name(*blocks, i)].push_back(set);
       }
   }
@@ -220,43 +201,47 @@ vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, int step) {
   return one_data_set(merged, false);
 }
 
-vtkSmartPointer<vtkDataObject> read_ensight_case(const Path& path, int step) {
-  const vtkSmartPointer<vtkDataObject> data = read_ensight(path, step);
-  for (vtkDataSet* const part : data_sets_in(data)) name_symmetric_components(*part);
-  return data;
+/// @param path  The case's folder, a .foam file in it, or its system/controlDict.
+MeshFile open_openfoam(const Path& path) {
+  const Path parent = std::filesystem::absolute(path).parent_path();
+  const OpenFoamParts parts = openfoam_parts(path, std::filesystem::is_directory(path) ? path
+                                                   : path.filename() == "controlDict"  ? parent.parent_path()
+                                                                                       : parent);
+  return {static_cast<int>(parts.times.size()),
+          [parts](int step) { return read_regions(parts, parts.times[static_cast<std::size_t>(step)]); }};
 }
 
-int ensight_steps(const Path& path) { return static_cast<int>(ensight_times(path).size()); }
-
-int collection_length(const Path& path) { return static_cast<int>(collection_steps(path).size()); }
+/// EnSight's symmetric tensors are in VTK's order.
+MeshFile open_ensight_case(const Path& path) {
+  const MeshFile file = open_ensight(path);
+  return {file.steps, [file](int step) {
+            auto data = file.read(step);
+            for (vtkDataSet* const part : data_sets_in(data)) name_symmetric_components(*part);
+            return data;
+          }};
+}
 
 }  // namespace
 
 const std::vector<MeshFormat>& mesh_formats() {
   static const std::vector<MeshFormat> formats = {
-      {"a legacy VTK file", "", {".vtk"}, read_legacy, nullptr, check_legacy},
-      {"a VTK image", "ImageData", {".vti"}, read_xml},
-      {"a VTK rectilinear grid", "RectilinearGrid", {".vtr"}, read_xml},
-      {"a VTK structured grid", "StructuredGrid", {".vts"}, read_xml},
-      {"a VTK unstructured grid", "UnstructuredGrid", {".vtu"}, read_xml},
-      {"a VTK image in pieces", "PImageData", {".pvti"}, read_xml, nullptr, nullptr, true},
-      {"a VTK rectilinear grid in pieces", "PRectilinearGrid", {".pvtr"}, read_xml, nullptr, nullptr, true},
-      {"a VTK structured grid in pieces", "PStructuredGrid", {".pvts"}, read_xml, nullptr, nullptr, true},
-      {"a VTK unstructured grid in pieces",
-       "PUnstructuredGrid",
-       {".pvtu"},
-       read_unstructured_pieces,
-       nullptr,
-       nullptr,
-       true},
-      {"an ExodusII file", "", {".ex2", ".exo", ".e", ".g"}, read_exodus, exodus_steps, require_whole_netcdf},
-      {"a CGNS file", "", {".cgns"}, read_cgns, cgns_steps},
-      {"an OpenFOAM case", "", {".foam"}, read_openfoam, openfoam_steps, check_openfoam, true},
-      {"a case of EnSight", "", {".case", ".encas"}, read_ensight_case, ensight_steps, nullptr, true},
-      {"an XDMF file", "", {".xdmf", ".xmf", ".xdmf2", ".xdmf3"}, read_xdmf, xdmf_steps, nullptr, true},
-      {"a VTKHDF file", "", {".vtkhdf", ".hdf"}, read_vtkhdf, vtkhdf_steps, nullptr, true},
+      {"a legacy VTK file", "", {".vtk"}, open_legacy},
+      {"a VTK image", "ImageData", {".vti"}, open_xml},
+      {"a VTK rectilinear grid", "RectilinearGrid", {".vtr"}, open_xml},
+      {"a VTK structured grid", "StructuredGrid", {".vts"}, open_xml},
+      {"a VTK unstructured grid", "UnstructuredGrid", {".vtu"}, open_xml},
+      {"a VTK image in pieces", "PImageData", {".pvti"}, open_xml, true},
+      {"a VTK rectilinear grid in pieces", "PRectilinearGrid", {".pvtr"}, open_xml, true},
+      {"a VTK structured grid in pieces", "PStructuredGrid", {".pvts"}, open_xml, true},
+      {"a VTK unstructured grid in pieces", "PUnstructuredGrid", {".pvtu"}, open_unstructured_pieces, true},
+      {"an ExodusII file", "", {".ex2", ".exo", ".e", ".g"}, open_exodus},
+      {"a CGNS file", "", {".cgns"}, open_cgns},
+      {"an OpenFOAM case", "", {".foam"}, open_openfoam, true},
+      {"a case of EnSight", "", {".case", ".encas"}, open_ensight_case, true},
+      {"an XDMF file", "", {".xdmf", ".xmf", ".xdmf2", ".xdmf3"}, open_xdmf, true},
+      {"a VTKHDF file", "", {".vtkhdf", ".hdf"}, open_vtkhdf, true},
       {"a VTK multi-block file", "vtkMultiBlockDataSet", {".vtm"}},
-      {"a ParaView collection", "Collection", {".pvd"}, nullptr, collection_length},
+      {"a ParaView collection", "Collection", {".pvd"}},
   };
   return formats;
 }

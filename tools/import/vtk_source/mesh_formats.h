@@ -1,30 +1,20 @@
 #pragma once
 /// @file tools/import/vtk_source/mesh_formats.h
 /// The formats of meshes, and the readers that make VTK data sets of them: a new format is one row of the table.
-/// Private to the importer.
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
-class vtkDataObject;
-template <class T>
-class vtkSmartPointer;
+#include "tools/import/vtk/mesh_file.h"
 
 namespace tensorray {
 
 struct MeshFormat {
-  using Path = std::filesystem::path;
-
   std::string text;                  ///< For messages.
   std::string xml_type;              ///< The type in <VTKFile type="...">; empty if the format is not VTK's XML.
   std::vector<std::string> endings;  ///< Lower case.
-  /// Reads a file at a step of time, from 0 on. Null: a collection, which only names other files (vtk_collection.h).
-  vtkSmartPointer<vtkDataObject> (*read)(const Path& path, int step) = nullptr;
-  int (*steps)(const Path& path) = nullptr;   ///< Counts the steps of time, 0 or more. Null: there is one.
-  void (*check)(const Path& path) = nullptr;  ///< Finds damage that is cheap to find before VTK reads the file.
-
-  bool has_other_files = false;  ///< Which hold its numbers.
+  MeshFile (*open)(const std::filesystem::path& path) = nullptr;  ///< Null: a collection, which only names other files.
+  bool has_other_files = false;                                   ///< Which hold its numbers.
 
   bool is_in_pieces() const { return xml_type.compare(0, 1, "P") == 0; }
 };

@@ -1,14 +1,19 @@
 #include "tools/import/vtk_source/vtk_source.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vtkDataSet.h>
 #include <vtkSmartPointer.h>
+#include <vtkXMLDataElement.h>
+#include <vtkXMLUtilities.h>
 
 #include "base/errors.h"
 #include "base/process/process_limits.h"
@@ -17,48 +22,76 @@
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk/vtk_pieces.h"
 #include "tools/import/vtk_formats/array_names.h"
-#include "tools/import/vtk_formats/vtk_tags.h"
 #include "tools/import/vtk_source/find_format.h"
-#include "tools/import/vtk_source/vtk_collection.h"
 
 namespace tensorray {
 namespace {
 
 using Path = std::filesystem::path;
 
-int steps_in(const MeshFormat& format, const Path& path) { return format.steps ? std::max(1, format.steps(path)) : 1; }
+using FilesByTime = std::map<double, std::vector<Path>>;
 
-/// Checks a number that the user gives. @return the step, from 0 on.
-int chosen_step(const MeshFormat& format, const Path& path, std::optional<int> step) {
-  const int steps = steps_in(format, path);
-  if (step && *step >= steps)
-    throw std::invalid_argument("--steps " + std::to_string(*step + 1) + ": there are " + std::to_string(steps) +
-                                " steps of time");
-  return step.value_or(steps - 1);
+double time_of(vtkXMLDataElement& element, const Path& path) {
+  const char* const text = element.GetAttribute("timestep");
+  double time = 0;
+  if (text && (!element.GetScalarAttribute("timestep", time) || !std::isfinite(time)))
+    fail(path, "its time '" + escaped(text) + "' is not a number; write it again");
+  return time;
 }
 
-/// The sound data sets with cells of a file, or of the files that it names.
-DataSets read_data_sets(const MeshFormat& format, const Path& path, const VtkMessages& messages,
-                        std::optional<int> step) {
-  DataSets sets;
-  const int chosen = chosen_step(format, path, step);
-  if (format.read) {
-    std::optional<ExtraMemoryLimit> limit;
-    if (!format.has_other_files) limit.emplace(max_memory_of(path));
-    sets = data_sets_in(format.read(path, chosen));
-    messages.throw_error(path);
-    for (vtkDataSet* const set : sets) {
-      check_geometry(*set, path);
-      name_active_tensors(*set);
-    }
-    return sets;
+/// A file that is named twice for one time counts once.
+void add(std::vector<Path>& files, const Path& file) {
+  if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
+}
+
+/// Collects the <DataSet file="..."> of volumes in a tree of blocks.
+void collect(vtkXMLDataElement& element, const Path& path, FilesByTime& steps) {
+  for (int i = 0; i < element.GetNumberOfNestedElements(); ++i) {
+    vtkXMLDataElement& nested = *element.GetNestedElement(i);
+    const char* const file = nested.GetAttribute("file");
+    if (nested.GetName() == std::string("DataSet") && file && lower_case_ending(file) != ".vtp")
+      add(steps[time_of(nested, path)], (path.parent_path() / file).lexically_normal());
+    collect(nested, path, steps);
   }
-  std::vector<Path> files;  // Of the data sets.
+}
+
+/// The files of volumes, each once, that a collection (.vtm, .pvd) names for each step of time, in the order of times.
+/// A .vtm has one step, with all of its blocks. Surfaces (.vtp) are left out, because exporters put a body's patches
+/// beside its volume.
+std::vector<std::vector<Path>> collection_steps(const Path& path) {
+  const auto root = vtkSmartPointer<vtkXMLDataElement>::Take(vtkXMLUtilities::ReadElementFromFile(path.c_str()));
+  if (!root) fail(path, "is damaged: it is no XML; write it again");
+  FilesByTime by_time;
+  collect(*root, path, by_time);
+  if (by_time.empty()) fail(path, "names no file of a volume; save the volume's grid");
+  std::vector<std::vector<Path>> steps;
+  for (auto& [time, files] : by_time) steps.push_back(std::move(files));
+  return steps;
+}
+
+/// A step, from 0 on: the user's, or the last one.
+std::size_t chosen_step(std::size_t steps, std::optional<int> step) {
+  if (step && static_cast<std::size_t>(*step) >= steps)
+    throw std::invalid_argument("--steps " + std::to_string(*step + 1) + ": there are " + std::to_string(steps) +
+                                " steps of time");
+  return step ? static_cast<std::size_t>(*step) : steps - 1;
+}
+
+std::size_t steps_in(const MeshFile& file) { return static_cast<std::size_t>(std::max(1, file.steps)); }
+
+DataSets read_data_sets(const Path& path, const MeshFormat& format, const VtkMessages& messages,
+                        std::optional<int> step);
+
+/// Those of all files that a collection names for a step.
+DataSets read_collection(const Path& path, const MeshFormat& format, const VtkMessages& messages,
+                         std::optional<int> step) {
   const std::vector<std::vector<Path>> steps = collection_steps(path);
-  for (const Path& file : steps[static_cast<std::size_t>(chosen)]) {
+  DataSets sets;
+  std::vector<Path> files;  // Of the data sets.
+  for (const Path& file : steps[chosen_step(steps.size(), step)]) {
     const MeshFormat& of_file = find_format(file);
     if (&of_file >= &format) fail(path, "names the collection " + escaped(file.string()) + "; import that one");
-    for (const auto& set : read_data_sets(of_file, file, messages, std::nullopt)) {
+    for (const auto& set : read_data_sets(file, of_file, messages, std::nullopt)) {
       for (std::size_t i = 0; i < sets.size(); ++i)
         if (files[i] != file && is_same_mesh(*sets[i], *set))
           fail(path, "names the same mesh twice for one time, as " + escaped(files[i].filename().string()) +
@@ -70,6 +103,22 @@ DataSets read_data_sets(const MeshFormat& format, const Path& path, const VtkMes
   return sets;
 }
 
+/// The sound data sets with cells of a file, or of the files that it names.
+DataSets read_data_sets(const Path& path, const MeshFormat& format, const VtkMessages& messages,
+                        std::optional<int> step) {
+  if (!format.open) return read_collection(path, format, messages, step);
+  std::optional<ExtraMemoryLimit> limit;
+  if (!format.has_other_files) limit.emplace(max_memory_of(path));
+  const MeshFile file = format.open(path);
+  const DataSets sets = data_sets_in(file.read(static_cast<int>(chosen_step(steps_in(file), step))));
+  messages.throw_error(path);
+  for (vtkDataSet* const set : sets) {
+    check_geometry(*set, path);
+    name_active_tensors(*set);
+  }
+  return sets;
+}
+
 }  // namespace
 
 vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path, std::optional<int> step) {
@@ -77,7 +126,7 @@ vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path, std::optional<int>
   const VtkMessages messages;
   vtkSmartPointer<vtkDataSet> result;
   try {
-    result = one_data_set(read_data_sets(format, path, messages, step));
+    result = one_data_set(read_data_sets(path, format, messages, step));
   } catch (const std::bad_alloc&) {
     throw std::runtime_error(path.string() + ": is damaged, or too large: it announces more than memory holds");
   }
@@ -92,9 +141,9 @@ vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path, std::optional<int>
 int time_steps(const Path& path) {
   const MeshFormat& format = find_format(path);
   const VtkMessages messages;
-  const int steps = steps_in(format, path);
+  const std::size_t steps = format.open ? steps_in(format.open(path)) : collection_steps(path).size();
   messages.throw_error(path);
-  return steps;
+  return static_cast<int>(steps);
 }
 
 }  // namespace tensorray
