@@ -50,6 +50,34 @@ inline Eigen::Matrix3d lens(const Eigen::Vector3d& at) {
   return tensor;
 }
 
+/// A map that is given, over a lattice of `count` × `count` quads of the square from (low, low) to (high, high).
+/// Lengths are the starts' x.
+template <class Map>
+FlowMap lattice_map(int count, double low, double high, const Map& landing) {
+  FlowMap map;
+  const double side = (high - low) / count;
+  for (int y = 0; y <= count; ++y)
+    for (int x = 0; x <= count; ++x) {
+      map.starts.emplace_back(low + x * side, low + y * side);
+      map.landings.push_back(Eigen::Vector2d(landing(map.starts.back())).cast<float>());
+      map.lengths.push_back(static_cast<float>(map.starts.back().x()));
+    }
+  map.ends.assign(map.starts.size(), RayEnd::plate);
+  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    const auto triangle = static_cast<std::uint32_t>(map.triangles.size());
+    map.triangles.push_back({{a, b, c}, side * side / 2, 0, false});
+    for (const auto& [from, to] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)})
+      map.edges.push_back({from, to, triangle});
+  };
+  const auto up = static_cast<std::uint32_t>(count + 1);
+  for (std::uint32_t y = 0; y + 1 < up; ++y)
+    for (std::uint32_t a = y * up; a + 1 < (y + 1) * up; ++a) {
+      add(a, a + 1, a + up + 1);
+      add(a, a + up + 1, a + up);
+    }
+  return map;
+}
+
 inline FlowSettings range(double first, double last) {
   FlowSettings settings;
   settings.flexibilities = {first, last};

@@ -22,7 +22,7 @@ enum class BendingMethod {
   euler,      ///< The paper's Eq. 3–4: D ← normalize(D + σ h T(P) D), P ← P + h D. Order 1.
   splitting,  ///< Drift h/2, kick D ← normalize(exp(h σ T(P)) D), drift h/2. Order 2; exact in V for constant T; stable
               ///< at any step length.
-  splitting4,  ///< Six such kicks between drifts (composition.h). Order 4; exact in V for constant T; stable at any
+  splitting4,  ///< Six such kicks between drifts (methods.h). Order 4; exact in V for constant T; stable at any
                ///< step length; adaptive, unless the step is given.
   rk4,         ///< Classical Runge–Kutta. Order 4.
   bs23,        ///< Bogacki–Shampine, adaptive. Order 3.

@@ -72,11 +72,4 @@ bool FlowLattice::is_at_edge(const Quad& quad) const {
          (patch.is_edge[2] && row + 1 == static_cast<std::uint32_t>(patch.rows)) || (patch.is_edge[3] && column == 0);
 }
 
-bool FlowLattice::is_on_border(const Quad& quad) const {
-  const Patch& patch = patches[quad.patch];
-  const std::uint32_t side = side_of(quad), right = static_cast<std::uint32_t>(patch.columns) << levels,
-                      top = static_cast<std::uint32_t>(patch.rows) << levels;
-  return quad.x == 0 || quad.y == 0 || quad.x + side == right || quad.y + side == top;
-}
-
 }  // namespace tensorray

@@ -1,7 +1,7 @@
 #pragma once
 /// @file tracing/flow/flow_lattice.h
-/// The lattice on which the quads of a flow map lie. Coordinates on it are integers, so that neighbours are found
-/// by hashing. A part of flow_map.cpp.
+/// The lattice on which the quads of a flow map lie, and the triangles that they become. Coordinates on it are
+/// integers, so that neighbours are found by hashing.
 
 #include <array>
 #include <cstdint>
@@ -10,6 +10,9 @@
 #include <vector>
 
 #include <Eigen/Core>
+
+#include "renderer/lights/beam.h"
+#include "tracing/flow/flow_map.h"
 
 namespace tensorray {
 
@@ -42,7 +45,6 @@ struct Quad {
 struct FlowLattice {
   std::vector<Patch> patches;
   int levels = 1;          ///< Number of divisions from the first quads to the smallest ones, up to 14.
-  int still_levels = 0;    ///< The last of these divisions, which only light needs that lands in one place.
   bool is_graded = false;  ///< Whether vertices are closer to each other at the aperture's edge.
   std::unordered_map<std::uint64_t, std::uint32_t> vertices;  ///< Their indices in the map, by `key`.
 
@@ -61,9 +63,11 @@ struct FlowLattice {
 
   /// Whether the quad is a part of a first quad that has a side at the aperture's edge.
   bool is_at_edge(const Quad& quad) const;
-
-  /// Whether a side of the quad is one of its patch.
-  bool is_on_border(const Quad& quad) const;
 };
+
+/// Adds the triangles and edges of `quads` to `map`. The quads cover the lattice once; the map has the landings of
+/// their corners. A quad becomes two triangles. If a neighbour is finer, it becomes as many as there are vertices on
+/// its outline, about a new vertex in its middle, whose landings are the mean of the corners'.
+void add_triangles(const FlowLattice& lattice, const std::vector<Quad>& quads, const Beam& beam, FlowMap& map);
 
 }  // namespace tensorray

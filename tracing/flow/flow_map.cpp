@@ -10,7 +10,6 @@
 
 #include "base/geometry/box.h"
 #include "base/process/job.h"
-#include "tracing/flow/flow_triangles.h"
 #include "tracing/flow/flow_vertices.h"
 
 namespace tensorray {
@@ -27,9 +26,7 @@ constexpr double usual_tolerance = 0.5;  // Pixels.
 constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
                                 // its own way within a part of one.
 constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than this part of the tolerance is allowed.
-constexpr float still_pixels = 1;  // Light that moves by no more, from the first wavelength sample to the last, is in
-                                   // one place.
-constexpr double swept_share = 0.99;  // The part of the vertices whose light moves slowly enough from band to band.
+constexpr double swept_share = 0.99;   // The part of the vertices whose light moves slowly enough from band to band.
 constexpr int max_levels = 14;
 constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
 
@@ -78,8 +75,6 @@ class FlowMapBuilder {
     first_size_ = static_cast<float>(size / pixel);
     const double finest = std::min(settings.finest, settings.tolerance) * pixel;
     while (lattice().levels < max_levels && std::ldexp(size, -lattice().levels) > finest) ++lattice().levels;
-    lattice().still_levels = is_light() && lattice().levels < max_levels ? 1 : 0;
-    lattice().levels += lattice().still_levels;
   }
 
   FlowMap build() && {
@@ -149,9 +144,6 @@ class FlowMapBuilder {
     return reach.landed > 0 && (settings_.beside || ((reach.low < size).all() && (reach.high > 0).all()));
   }
 
-  /// Whether the map is to be drawn as light. Otherwise it says what is seen at each place.
-  bool is_light() const { return settings_.silhouette; }
-
   /// The lesser extent of a quad's light on the plate, pixels; 0 on a fold.
   float width_of(const Quad& quad, const Reach& reach, std::size_t sample) const {
     const auto& [a, b, c, d] = quad.corners;
@@ -161,26 +153,21 @@ class FlowMapBuilder {
     return area > 0 ? area / (reach.high - reach.low).maxCoeff() : 0;
   }
 
-  /// The error of landings that a quad may have, pixels, where it says what is seen at a place.
+  /// The error of landings that a quad may have, pixels. In a map that is drawn as light, the error moves light: of
+  /// that, a larger quad has more, and it is seen less where it is spread over the plate, or by the range.
   /// @param extent  The greatest of the quad's landings, pixels.
-  float place_bound(float extent) const {
-    return static_cast<float>(settings_.tolerance) * std::sqrt(std::max(extent, 1.0f));
-  }
-
-  /// The error of landings that a quad may have, pixels, in a map that is drawn as light. The error moves light: of
-  /// that, a larger quad has more, and it is seen less where it is spread over the plate. As the map also says where
-  /// light of each place comes from, `place_bound` must hold, too.
-  /// @param width  The least of the quad's light at any wavelength, pixels.
-  /// @param sweep  The distance of its light from the first wavelength sample to the last, pixels.
-  float light_bound(const Quad& quad, float extent, float width, float sweep) const {
-    const float size = std::ldexp(first_size_, -quad.level), pixel = 1;
-    const float bound = static_cast<float>(settings_.tolerance) * std::max(width / size, gathered_part);
-    return std::min(bound, place_bound(extent)) * std::cbrt(std::max(sweep / std::max(width, pixel), 1.0f));
+  /// @param width   The least of the quad's light at any wavelength, pixels.
+  /// @param sweep   The distance of its light from the first wavelength sample to the last, pixels.
+  float error_bound(const Quad& quad, float extent, float width, float sweep) const {
+    const float tolerance = static_cast<float>(settings_.tolerance), pixel = 1;
+    if (!settings_.silhouette) return tolerance * std::sqrt(std::max(extent, pixel));
+    const float size = std::ldexp(first_size_, -quad.level);
+    return tolerance * std::max(width / size, gathered_part) *
+           std::cbrt(std::max(sweep / std::max(width, pixel), 1.0f));
   }
 
   bool needs_division(const Quad& quad) const {
     if (quad.level >= lattice().levels) return false;
-    const bool is_for_still_light = quad.level >= lattice().levels - lattice().still_levels;
     const bool is_at_edge = settings_.silhouette && lattice().is_at_edge(quad);
     if (quad.level < (is_at_edge ? edge_levels : 1)) return true;  // There is no estimate of its error yet.
     bool is_seen = false;
@@ -189,7 +176,7 @@ class FlowMapBuilder {
     for (const std::size_t sample : vertices_.check_samples()) {
       const Reach reach = reach_of(quad.corners, sample);
       if (!is_on_plate(reach)) continue;
-      if (reach.landed < 4) return !is_for_still_light;
+      if (reach.landed < 4) return true;
       width = std::min(width, width_of(quad, reach, sample));
       extent = std::max(extent, (reach.high - reach.low).maxCoeff());
       last = map().landing(quad.corners[0], sample);
@@ -197,8 +184,8 @@ class FlowMapBuilder {
       is_seen = true;
     }
     const float sweep = settings_.range ? (last - first).norm() : 0;
-    if (!is_seen || (is_for_still_light && sweep > still_pixels)) return false;
-    return quad.error > (is_light() ? light_bound(quad, extent, width, sweep) : place_bound(extent));
+    if (!is_seen) return false;
+    return quad.error > error_bound(quad, extent, width, sweep);
   }
 
   /// The quads that need division, or those with the greatest errors if they are too many.
@@ -247,14 +234,9 @@ class FlowMapBuilder {
   Middles middles_of(const Quad& quad) {
     const std::uint32_t side = lattice().side_of(quad), half = side / 2, x = quad.x, y = quad.y, p = quad.patch;
     const auto& [a, b, c, d] = quad.corners;
-    // At the silhouette, landings are singular: neighbours say little about each other.
-    const bool has_parents = !settings_.silhouette || !lattice().is_on_border(quad);
-    const auto middle = [&](std::uint32_t at_x, std::uint32_t at_y, const Parents& parents) {
-      return vertices_.at(p, at_x, at_y, has_parents ? parents : Parents());
-    };
-    return {middle(x + half, y, {{a, b}, 2}), middle(x + side, y + half, {{b, c}, 2}),
-            middle(x + half, y + side, {{c, d}, 2}), middle(x, y + half, {{d, a}, 2}),
-            middle(x + half, y + half, {{a, b, c, d}, 4})};
+    return {vertices_.at(p, x + half, y, {{a, b}, 2}), vertices_.at(p, x + side, y + half, {{b, c}, 2}),
+            vertices_.at(p, x + half, y + side, {{c, d}, 2}), vertices_.at(p, x, y + half, {{d, a}, 2}),
+            vertices_.at(p, x + half, y + half, {{a, b, c, d}, 4})};
   }
 
   /// The error is what the part's own deviation will be if deviations go on to fall by the same ratio: to a quarter

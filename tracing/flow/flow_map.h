@@ -37,7 +37,6 @@ struct FlowSettings {
 
   double tolerance = 0.5;  ///< Wanted error of landings between vertices, pixels; > 0.
   double finest = 0.5;     ///< Size of the smallest quads, pixels of straight light; the tolerance if it is less; > 0.
-                           ///< Half of it where light of all wavelengths lands in one place.
 
   bool silhouette = true;  ///< Whether the edge of the aperture is that of the volume, and the map is drawn as light.
                            ///< Rays from the edge start a little further inside, as they must enter the volume.
@@ -144,27 +143,10 @@ inline bool jumps(bool is_torn, const Eigen::Vector2d& a, const Eigen::Vector2d&
 /// Traces the map from `beam` to the plane of the plate. `right` and `up` of the beam need not be across its direction:
 /// its light may start on any plane.
 ///
-/// The mesh begins as a lattice of quads; an aperture that is no parallelogram has a lattice for each corner. The side
-/// of a quad is 8 pixels, or a voxel if that is less, but voxels do not ask for more than 64 quads along a side. Each
-/// quad is divided into four. A part is divided again, down to the finest size, if its error is likely to be too great,
-/// or if light of some of its corners lands and that of others does not. The error follows from how far landings within
-/// the parent were from what the parent's corners predict. Quads whose light falls beside the plate stay as they are.
-///
-/// Say that a quad is n pixels wide, and that its light is w pixels wide and e long on the plate. Its error may be √e
-/// times the tolerance, if e > 1. In a map that is drawn as light, it may be w / n times the tolerance, but no less
-/// than half of the tolerance, and no more than in other maps; if the range spreads its light over more than w, the
-/// bound grows with the cube root of that distance. Light that the range does not spread has quads of half the finest
-/// size, where all of it lands.
-///
-/// At the silhouette, light leaves the volume at once, through the face along which it goes, or is torn from light that
-/// stays. There landings change with the root of the distance from the edge, and jump. The distances of vertices from
-/// the edge therefore grow as the squares of whole numbers within the first quads, and quads are divided twice before
-/// their error is estimated.
-///
-/// A range has 33 wavelength samples. Each vertex first sends light at 5 of them, or at 3 if the vertices beside it
-/// agree about what is between. Where landings are so smooth that an error of more than 1/300 of the tolerance is
-/// unlikely, the others are predicted (wavelength_prediction.h). Elsewhere more samples are traced, up to all, in each
-/// quarter of the range on its own. (At a caustic, a small error of the landing is a great one of the colour.)
+/// The mesh begins as a lattice of quads; an aperture that is no parallelogram has a lattice for each corner. A quad is
+/// divided into four while its error is likely to be too great, or if light of some of its corners lands and that of
+/// others does not, down to the finest size. A range has 33 wavelength samples, of which most are predicted where
+/// landings are smooth (wavelength_prediction.h). docs/dev/flow_maps.md has the rules, with equations.
 ///
 /// If `geometry` has a body instead of a plate, the landings of light from the volume are the projections of the points
 /// of the body on `settings.plate`: along its normal, or from the beam's source if it has one. Light counts as landed

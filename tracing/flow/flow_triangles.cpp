@@ -1,9 +1,9 @@
-#include "tracing/flow/flow_triangles.h"
-
 #include <array>
 #include <cstdint>
 
 #include <tbb/parallel_for.h>
+
+#include "tracing/flow/flow_lattice.h"
 
 namespace tensorray {
 namespace {
@@ -35,7 +35,7 @@ class TriangleBuilder {
   /// Whether the map jumps across a side of a smallest quad. The landings at its ends are then far apart, and those
   /// at the ends of the side's other half, in the parent, are not.
   bool is_torn(const Quad& quad) const {
-    if (quad.level < lattice_.levels - lattice_.still_levels || !(quad.deviation > torn_pixels / 2)) return false;
+    if (quad.level < lattice_.levels || !(quad.deviation > torn_pixels / 2)) return false;
     const std::uint32_t half = lattice_.side_of(quad), left = quad.x / (2 * half) * 2 * half,
                         top = quad.y / (2 * half) * 2 * half;
     std::array<std::array<std::uint32_t, 3>, 3> grid;  // The vertices of the parent, by row and column.

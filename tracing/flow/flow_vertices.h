@@ -1,6 +1,6 @@
 #pragma once
 /// @file tracing/flow/flow_vertices.h
-/// The vertices of a flow map, and where their light lands. A part of flow_map.cpp.
+/// The vertices of a flow map, and where their light lands.
 
 #include <array>
 #include <cstddef>

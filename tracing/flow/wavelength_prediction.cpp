@@ -6,7 +6,6 @@ namespace tensorray {
 namespace {
 
 constexpr std::size_t quarters = 4, quarter_samples = (range_samples - 1) / quarters;
-constexpr float beside_quarter = 4;  // Samples beside a quarter may miss so many times as much as its own.
 
 /// The first sample of a quarter, and its last one, which is also the first one of the next quarter.
 std::size_t first_of(std::size_t quarter) { return quarter * quarter_samples; }
@@ -64,20 +63,6 @@ Eigen::Vector2f missed(const Eigen::Vector2f* landings, std::size_t step, std::s
   return landings[sample] - polynomials(step).at(landings, sample);
 }
 
-/// Whether every `step`-th sample from `first` to `last` has one face.
-bool is_one_face(std::size_t first, std::size_t last, std::size_t step, const ExitFaces& faces) {
-  for (std::size_t sample = first + step; sample <= last; sample += step)
-    if (faces[sample] != faces[first]) return false;
-  return true;
-}
-
-/// Whether the samples from which a quarter's are predicted have one face.
-bool is_one_face(std::size_t quarter, std::size_t step, const ExitFaces& faces) {
-  const Polynomials& all = polynomials(step);
-  const std::size_t first = all.stencils[first_of(quarter) + 1].first, last = all.stencils[last_of(quarter) - 1].first;
-  return is_one_face(first, last + (all.count - 1) * step, step, faces);
-}
-
 }  // namespace
 
 WavelengthPrediction::WavelengthPrediction(FlowMap& map, std::size_t vertex, const Parents& parents,
@@ -131,19 +116,15 @@ bool WavelengthPrediction::parents_agree(std::size_t quarter, std::size_t step, 
   return true;
 }
 
-bool WavelengthPrediction::is_smooth(std::size_t quarter, std::size_t step, float tolerance,
-                                     const ExitFaces& faces) const {
-  const std::size_t coarse = 2 * step, reach = (polynomials(coarse).count - 1) * coarse;
+bool WavelengthPrediction::is_smooth(std::size_t quarter, std::size_t step, float tolerance) const {
+  const std::size_t coarse = 2 * step;
   for (std::size_t sample = step; sample < range_samples; sample += coarse) {
-    const bool is_within = overlaps(sample - step, sample + step, quarter);
-    if (!is_within && !overlaps(sample - std::min(sample, 3 * step), sample + 3 * step, quarter)) continue;
+    if (!overlaps(sample - step, sample + step, quarter)) continue;
     if (!matters(sample - step, step) && !matters(sample, step)) continue;
     const Stencil& stencil = polynomials(coarse).stencils[sample];
-    if (!is_within && !is_one_face(stencil.first, stencil.first + reach, coarse, faces)) continue;
     for (std::size_t i = 0; i < polynomials(coarse).count; ++i)
       if (!landed(stencil.first + i * coarse)) return false;
-    const float allowed = is_within ? tolerance : beside_quarter * tolerance;
-    if (!landed(sample) || !(missed(landings_, coarse, sample).norm() <= allowed)) return false;
+    if (!landed(sample) || !(missed(landings_, coarse, sample).norm() <= tolerance)) return false;
   }
   return true;
 }
@@ -174,32 +155,30 @@ Eigen::Vector2f WavelengthPrediction::between(std::size_t sample, std::size_t st
 }
 
 /// Sets the samples of a quarter that are not traced.
-void WavelengthPrediction::set(std::size_t quarter, std::size_t step, bool beside_parents, ExitFaces& faces) {
+void WavelengthPrediction::set(std::size_t quarter, std::size_t step, bool beside_parents) {
   for (std::size_t sample = first_of(quarter); sample <= last_of(quarter); ++sample) {
     if (sample % step == 0) continue;
     const std::size_t before = sample / step * step;
     ends_[sample] = ends_[2 * (sample - before) < step ? before : before + step];
-    faces[sample] = faces[before];
     landings_[sample] = between(sample, step);
     if (beside_parents) landings_[sample] += missed(mean_.data(), step, sample);
   }
 }
 
-bool WavelengthPrediction::predict(std::size_t step, float tolerance, ExitFaces& faces) {
+bool WavelengthPrediction::predict(std::size_t step, float tolerance) {
   if (step == 1) return true;
   std::array<bool, quarters> is_ready{}, beside_parents{};
   for (std::size_t quarter = 0; quarter < quarters; ++quarter) {
-    if (is_predicted_[quarter] || !is_one_face(quarter, step, faces)) continue;
+    if (is_predicted_[quarter]) continue;
     beside_parents[quarter] = is_smooth_beside_parents(quarter, step, tolerance);
     // Three samples do not tell by themselves how smooth landings are.
-    is_ready[quarter] =
-        beside_parents[quarter] || (step <= quarter_samples && is_smooth(quarter, step, tolerance, faces));
+    is_ready[quarter] = beside_parents[quarter] || (step <= quarter_samples && is_smooth(quarter, step, tolerance));
   }
   const auto is_true = [](bool each) { return each; };
   if (step > quarter_samples && !std::all_of(is_ready.begin(), is_ready.end(), is_true)) return false;
   for (std::size_t quarter = 0; quarter < quarters; ++quarter) {
     if (!is_ready[quarter]) continue;
-    set(quarter, step, beside_parents[quarter], faces);
+    set(quarter, step, beside_parents[quarter]);
     is_predicted_[quarter] = true;
   }
   return std::all_of(is_predicted_.begin(), is_predicted_.end(), is_true);

@@ -1,7 +1,7 @@
 #pragma once
 /// @file tracing/flow/wavelength_prediction.h
 /// Predicts the landings of a vertex at wavelength samples that are not traced: from its traced ones, and from those of
-/// the vertices between which it lies. A part of wavelength_tracer.cpp.
+/// the vertices between which it lies.
 
 #include <array>
 #include <cstddef>
@@ -14,9 +14,6 @@
 namespace tensorray {
 
 constexpr std::size_t range_samples = 33;  // Wavelength samples of a range.
-
-/// The face of the volume through which light leaves it, at each sample.
-using ExitFaces = std::array<std::uint8_t, range_samples>;
 
 /// The vertices in whose middle a new one lies: the ends of a side, or the corners of a quad. All of them are traced.
 struct Parents {
@@ -40,13 +37,10 @@ class WavelengthPrediction {
   bool parents_agree(std::size_t step, float tolerance) const;
 
   /// Sets the samples that are not traced, in each quarter where they can be predicted to within `tolerance`, pixels,
-  /// if their light may fall on the plate. The test is to predict traced samples from every second one of them: those
-  /// of the quarter must be within `tolerance`, and those beside it, if light leaves through the same face, within four
-  /// times of it. Where landings are smooth, the error of untraced samples is then far less. Landings are not smooth
-  /// where light of the samples leaves the volume through different faces.
-  /// @param faces  Of the samples that are known; sets those of the others.
+  /// if their light may fall on the plate. The test is to predict traced samples of the quarter from every second one:
+  /// they must be within `tolerance`. Where landings are smooth, the error of untraced samples is then far less.
   /// @return Whether all samples are known.
-  bool predict(std::size_t step, float tolerance, ExitFaces& faces);
+  bool predict(std::size_t step, float tolerance);
 
   /// Whether a sample is in a quarter that is not predicted yet.
   bool is_open(std::size_t sample) const;
@@ -55,11 +49,11 @@ class WavelengthPrediction {
   bool landed(std::size_t sample) const { return ends_[sample] == RayEnd::plate; }
   bool is_on_plate(std::size_t sample) const;
   bool matters(std::size_t sample, std::size_t step) const;
-  bool is_smooth(std::size_t quarter, std::size_t step, float tolerance, const ExitFaces& faces) const;
+  bool is_smooth(std::size_t quarter, std::size_t step, float tolerance) const;
   bool parents_agree(std::size_t quarter, std::size_t step, float tolerance) const;
   bool is_smooth_beside_parents(std::size_t quarter, std::size_t step, float tolerance) const;
   Eigen::Vector2f between(std::size_t sample, std::size_t step) const;
-  void set(std::size_t quarter, std::size_t step, bool beside_parents, ExitFaces& faces);
+  void set(std::size_t quarter, std::size_t step, bool beside_parents);
 
   Eigen::Vector2f* landings_;
   RayEnd* ends_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -82,11 +81,10 @@ void WavelengthTracer::predict_lengths(FlowMap& map, std::size_t vertex, const P
 
 void WavelengthTracer::trace(FlowMap& map, const std::vector<NewVertex>& vertices) {
   std::vector<SampleRay> rays;
-  std::vector<ExitFaces> faces(vertices.size());
   if (!is_range_) {
     for (std::size_t sample = 0; sample < wavelengths(); ++sample)
       for (std::size_t i = 0; i < vertices.size(); ++i) rays.push_back({i, sample});
-    return trace_rays(map, vertices, rays, faces);
+    return trace_rays(map, vertices, rays);
   }
   std::vector<PartlyTraced> rest;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -96,9 +94,9 @@ void WavelengthTracer::trace(FlowMap& map, const std::vector<NewVertex>& vertice
   }
   for (bool is_first = true; !rest.empty(); is_first = false) {
     add_rays(rest, is_first, rays);
-    trace_rays(map, vertices, rays, faces);
+    trace_rays(map, vertices, rays);
     const auto is_done = [&](PartlyTraced& each) {
-      if (!each.prediction.predict(each.step, tolerance_, faces[each.vertex])) return false;
+      if (!each.prediction.predict(each.step, tolerance_)) return false;
       const NewVertex& vertex = vertices[each.vertex];
       if (each.step == coarsest_step) predict_lengths(map, vertex.index, vertex.parents);
       return true;
@@ -118,18 +116,8 @@ RayEnd WavelengthTracer::end_of(const RayBatch& rays, std::size_t ray, const Eig
   return body_->alone.absorber(rays.position[ray] + body_->off * back, back) ? RayEnd::obstacle : RayEnd::plate;
 }
 
-/// The face of the volume's box through which the straight end of a ray left it, 0 to 5.
-std::uint8_t WavelengthTracer::exit_face(const Eigen::Vector3d& position, const Eigen::Vector3d& direction) const {
-  const Eigen::Array3d at = field_.to_index() * position, along = field_.to_index().linear() * direction;
-  const Eigen::AlignedBox3d& box = field_.index_bounds();
-  const Eigen::Array3d face = (along > 0).select(box.max().array(), box.min().array());
-  Eigen::Index axis = 0;
-  (along != 0).select((face - at) / along, std::numeric_limits<double>::infinity()).minCoeff(&axis);
-  return static_cast<std::uint8_t>(2 * axis + (along[axis] > 0 ? 1 : 0));
-}
-
 void WavelengthTracer::trace_rays(FlowMap& map, const std::vector<NewVertex>& vertices,
-                                  const std::vector<SampleRay>& rays, std::vector<ExitFaces>& faces) {
+                                  const std::vector<SampleRay>& rays) {
   RayBatch batch;
   for (const SampleRay& ray : rays) {
     const Eigen::Vector3d& origin = vertices[ray.vertex].origin;
@@ -146,7 +134,6 @@ void WavelengthTracer::trace_rays(FlowMap& map, const std::vector<NewVertex>& ve
     const std::size_t at = of.index * wavelengths() + sample;
     map.landings[at] = plate_.to_pixel(place_on(plate_, geometry_, beam_, batch.position[i])).cast<float>();
     map.ends[at] = end_of(batch, i, of.origin);
-    if (is_range_) faces[vertex][sample] = exit_face(batch.position[i], batch.direction[i]);
     if (sample % map.check_step == 0)
       map.lengths[of.index * check_samples_.size() + sample / map.check_step] = static_cast<float>(batch.length[i]);
   }

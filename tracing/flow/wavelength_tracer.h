@@ -1,6 +1,6 @@
 #pragma once
 /// @file tracing/flow/wavelength_tracer.h
-/// Landings of light of one vertex at all its wavelength samples. A part of flow_map.cpp.
+/// Landings of light of one vertex at all its wavelength samples.
 
 #include <atomic>
 #include <cstdint>
@@ -66,11 +66,9 @@ class WavelengthTracer {
   };
 
   static void add_rays(const std::vector<PartlyTraced>& vertices, bool is_first, std::vector<SampleRay>& rays);
-  void trace_rays(FlowMap& map, const std::vector<NewVertex>& vertices, const std::vector<SampleRay>& rays,
-                  std::vector<ExitFaces>& faces);
+  void trace_rays(FlowMap& map, const std::vector<NewVertex>& vertices, const std::vector<SampleRay>& rays);
   void predict_lengths(FlowMap& map, std::size_t vertex, const Parents& parents) const;
   RayEnd end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const;
-  std::uint8_t exit_face(const Eigen::Vector3d& position, const Eigen::Vector3d& direction) const;
 
   const TensorField& field_;
   const Geometry& geometry_;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tracing/flow_drawing/flow_pieces.h
-/// A flow map in small pieces, each of which is drawn at places of its own in the spectrum. A part of caustic.cpp.
+/// A flow map in small pieces, each of which is drawn at places of its own in the spectrum.
 
 #include <array>
 #include <cstdint>

@@ -36,7 +36,7 @@ void PacketMedium::find_bricks_near_surfaces() {
   for (int axis = 0; axis < 3; ++axis) {
     first_near[axis] = 1;
     last_near[axis] = 0;
-    if (!settings.meets_surface) continue;
+    if (!settings.geometry) continue;
     const double low = settings.surfaces.min()[axis] - margin_of_steps - cells;
     const double high = settings.surfaces.max()[axis] + margin_of_steps;
     first_near[axis] = static_cast<std::int32_t>(std::clamp(std::ceil(low / cells), -most, most));
@@ -63,11 +63,11 @@ struct LaneStep {
   LaneStep(const Packet& packet, int lane) : time(packet.time[lane]) {
     Eigen::Vector3d turned;
     for (int axis = 0; axis < 3; ++axis) {
-      from[axis] = packet.p[axis][lane];
-      to[axis] = packet.p_next[axis][lane];
-      from_direction[axis] = packet.u[axis][lane];
-      to_direction[axis] = packet.u_next[axis][lane];
-      turned[axis] = packet.v_next[axis][lane] - packet.v[axis][lane];
+      from[axis] = packet.now.p[axis][lane];
+      to[axis] = packet.next.p[axis][lane];
+      from_direction[axis] = packet.now.u[axis][lane];
+      to_direction[axis] = packet.next.u[axis][lane];
+      turned[axis] = packet.next.v[axis][lane] - packet.now.v[axis][lane];
       origin[axis] = double{TensorBrick::cells} * packet.brick[axis][lane];
     }
     turn = turned.norm();
@@ -90,6 +90,17 @@ struct LaneStep {
   }
 };
 
+/// Whether the straight way from one point to another meets a surface.
+bool meets_surface(const Geometry& geometry, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const bool may_absorb = geometry.may_absorb(from, to);
+  if (!may_absorb && !geometry.has_cut()) return false;
+  const double length = (to - from).norm();
+  if (!(length > 0)) return true;
+  const Eigen::Vector3d along = (to - from) / length;
+  return (geometry.has_cut() && geometry.crossing(Surface::cut, false, from, along, length)) ||
+         (may_absorb && geometry.absorber(from, along, length));
+}
+
 }  // namespace
 
 bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane) {
@@ -100,7 +111,7 @@ bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int la
   Eigen::Vector3d begin = step.from;
   for (int i = 1; i <= count; ++i) {
     const Eigen::Vector3d end = i == count ? step.to : step.at(path_weights(double(i) / count));
-    if (medium.settings.meets_surface(to_world(begin), to_world(end))) return true;
+    if (meets_surface(*medium.settings.geometry, to_world(begin), to_world(end))) return true;
     begin = end;
   }
   return false;

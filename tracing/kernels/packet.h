@@ -9,8 +9,7 @@
 #include <Eigen/Core>
 
 #include "tracing/kernels/packet_kernel.h"
-#include "tracing/steps/composition.h"
-#include "tracing/steps/step_lengths.h"
+#include "tracing/steps/methods.h"
 #include "volumes/bricks/cubic_brick.h"
 
 namespace tensorray::packets {
@@ -60,12 +59,18 @@ constexpr int max_terms = 11;
 constexpr int packet_rays = 32;  // Number of rays in a packet: several vectors.
 using PerRay = float[packet_rays];
 
+/// Where rays are. Only those with differentials have derivatives of p and v along two parameters.
+struct alignas(64) RayState {
+  PerRay p[3];  // Position, in voxels from the first voxel of the packet's brick.
+  PerRay v[3];  // V; unit, world axes.
+  PerRay u[3];  // The direction in index space: the change of p per world unit.
+  PerRay dp[2][3], dv[2][3];
+};
+
 /// Rays side by side, one in each lane. All lanes of its vectors hold a ray, so that no step needs a mask: a lane whose
 /// ray has ended repeats another ray.
 struct alignas(64) Packet {
-  PerRay p[3];                // Position, in voxels from the brick's first voxel.
-  PerRay v[3];                // V; unit, world axes.
-  PerRay u[3];                // The direction in index space: the change of p per world unit.
+  RayState now, next;         // Before and after the step that is being taken.
   PerRay kick;                // σ.
   PerRay length;              // Length of the path since the ray entered the packet, world units.
   PerRay wanted;              // The next step, voxels.
@@ -76,19 +81,14 @@ struct alignas(64) Packet {
   PerRay log_radiance_scale;  // Λ since the ray entered the packet; not of rays with differentials.
 
   // The step that is being taken:
-  PerRay time;         // Its length, world units.
-  PerRay sample[3];    // Positions of the samples.
-  PerRay voxel;        // Number, in the brick, of the first coefficient that the sample needs.
-  PerRay fraction[3];  // Position within the cell.
-  PerRay tensor[8];    // Stored components of the tensors (see TensorBrick), component after component.
-  PerRay p_next[3], v_next[3], u_next[3];
+  PerRay time;            // Its length, world units.
+  PerRay sample[3];       // Positions of the samples.
+  PerRay voxel;           // Number, in the brick, of the first coefficient that the sample needs.
+  PerRay fraction[3];     // Position within the cell.
+  PerRay tensor[8];       // Stored components of the tensors (see TensorBrick), component after component.
   PerRay change_of_step;  // Λ of this step.
   PerRay excess;          // Of adaptive steps: the error divided by the tolerance.
-
-  // Only for rays with differentials: derivatives of p and v along two parameters before and after the step, and slopes
-  // of the tensor along x, y and z.
-  PerRay dp[2][3], dv[2][3], dp_next[2][3], dv_next[2][3];
-  PerRay slopes[3][8];
+  PerRay slopes[3][8];    // Of the tensors along x, y and z; only for rays with differentials.
 
   const float* bending[packet_rays] = {};  // Of the bricks.
   alignas(64) std::int32_t brick[3][packet_rays];
@@ -110,7 +110,7 @@ struct StrongKick {
 /// @param T  T − T₂₂ I, column by column. @param factor  σ h.
 StrongKick strong_kick(const float T[9], float factor, const float v[3]);
 
-/// Whether the step of a lane, from p to p_next, meets a surface.
+/// Whether the step of a lane, from `now` to `next`, meets a surface.
 bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane);
 
 /// Records points between the ends of a lane's step, which may be long.

@@ -1,23 +1,6 @@
 /// @file tracing/kernels/packet_bricks-inl.h
 /// The bricks of a packet's lanes, and their sample points in these bricks.
 
-// Included once for each instruction set: see Highway's foreach_target.h.
-#if defined(TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
-#ifdef TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
-#undef TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
-#else
-#define TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
-#endif
-
-#include <algorithm>
-
-#include <hwy/highway.h>
-
-#include "tracing/kernels/packet_vectors-inl.h"
-
-HWY_BEFORE_NAMESPACE();
-namespace tensorray::packets::HWY_NAMESPACE {
-
 /// The brick of a lane. It is not compared with that of the lane before: where rays part, this costs more than it
 /// saves.
 HWY_INLINE TensorBrick brick_of(const PacketMedium& medium, const Packet& packet, int lane) {
@@ -81,7 +64,7 @@ HWY_INLINE void summarize(const PacketMedium& medium, Packet& packet) {
   find_reach(medium, packet);
   find_extent(medium, packet);
   packet.near_surface = false;
-  if (!medium.settings.meets_surface) return;
+  if (!medium.settings.geometry) return;
   for (int lane = 0; lane < packet.vectors * lanes; ++lane) {
     const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
     packet.near_surface |= medium.near_surface(at);
@@ -109,7 +92,7 @@ HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, std::
     const Mask moves = hn::Or(hn::Ne(bricks[0], zero), hn::Or(hn::Ne(bricks[1], zero), hn::Ne(bricks[2], zero)));
     moved |= to_bits(moves, i);
     for (int axis = 0; axis < 3; ++axis) {
-      store(hn::NegMulAdd(bricks[axis], cells, load(packet.p[axis], i)), packet.p[axis], i);
+      store(hn::NegMulAdd(bricks[axis], cells, load(packet.now.p[axis], i)), packet.now.p[axis], i);
       std::int32_t* const brick = packet.brick[axis] + i;
       hn::Store(hn::Add(hn::Load(ints, brick), hn::ConvertTo(ints, bricks[axis])), ints, brick);
     }
@@ -155,8 +138,3 @@ HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& 
   // The remaining points are outside the extent, or rounding put them on a face.
   find_cells(packet, beyond, point_of);
 }
-
-}  // namespace tensorray::packets::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#endif

@@ -5,24 +5,21 @@
 #include <cstddef>
 #include <cstring>
 #include <stdexcept>
+#include <type_traits>
 
 #include "tracing/kernels/packet.h"
+
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
 
 // The code below is compiled once for each instruction set. The best one of the processor is selected at run time.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tracing/kernels/packet_kernel.cpp"  // NOLINT
 #include <hwy/foreach_target.h>                                 // IWYU pragma: keep
 // Must come after foreach_target.h:
+#include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
-
-#if HWY_TARGET != HWY_SCALAR
-#include "tracing/kernels/packet_landing-inl.h"
-#include "tracing/kernels/packet_step-inl.h"
-#endif
-
-#if defined(__SSE__)
-#include <xmmintrin.h>
-#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
@@ -33,6 +30,15 @@ constexpr int lanes = 1;
 std::uint64_t trace(const PacketMedium&, KernelRays&) { return 0; }
 #else
 
+// Each needs those before it. They are parts of this namespace.
+// clang-format off
+#include "tracing/kernels/packet_vectors-inl.h"
+#include "tracing/kernels/packet_bricks-inl.h"
+#include "tracing/kernels/packet_splines-inl.h"
+#include "tracing/kernels/packet_step-inl.h"
+#include "tracing/kernels/packet_landing-inl.h"
+// clang-format on
+
 /// Takes rays, with or without differentials, through a field of tensors with so many components, in packets: fills a
 /// packet, steps it until all of its rays have ended, and takes those that leave the extent to its faces.
 template <int components, bool differentials>
@@ -40,25 +46,257 @@ class Kernel {
  public:
   Kernel(const PacketMedium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
 
-  std::uint64_t run();
+  std::uint64_t run() {
+    for (Packet& packet : packets_) fill(packet);
+    for (bool busy = true; busy;) {
+      busy = false;
+      for (Packet& packet : packets_) {
+        if (packet.alive == 0) continue;
+        busy = true;
+        step(packet);
+        if (HWY_LIKELY(packet.alive != 0)) continue;
+        Packet& leaving = leaving_[&packet - packets_];
+        if (leaving.alive != 0) land(leaving);
+        fill(packet);
+      }
+    }
+    return samples_;
+  }
 
  private:
   // Number of packets that are stepped in turn. With enough vectors, the processor has work while one of them waits.
   static constexpr int in_flight = lanes > 8 ? 2 : 1;
 
-  void fill(Packet& packet);
-  void enter(Packet& packet, int lane);
-  static void copy_lane(const Packet& from, int of, Packet& to, int lane);
-  static void copy_end(const Packet& from, int of, Packet& to, int lane);
-  void compact(Packet& packet);
-  void step(Packet& packet);
-  std::uint32_t stopped(Packet& packet) const;
-  std::uint32_t spent(const Packet& packet) const;
-  void add_step(Packet& packet);
-  void retire(Packet& packet, std::uint32_t stop, std::uint32_t leave);
-  void keep_points(const Packet& packet, std::uint32_t which);
-  void land(Packet& packet);
-  void arrive(Packet& packet, const FaceLanding& landing);
+  /// Copies a ray into a lane.
+  void enter(Packet& packet, int lane) {
+    const KernelRay& ray = rays_[packet.ray[lane]];
+    for (int axis = 0; axis < 3; ++axis) {
+      packet.now.p[axis][lane] = ray.place.position[axis];
+      packet.now.v[axis][lane] = ray.direction[axis];
+      packet.brick[axis][lane] = ray.place.brick[axis];
+      if constexpr (differentials)
+        for (int i = 0; i < 2; ++i) {
+          packet.now.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis] * medium_.unit;
+          packet.now.dv[i][axis][lane] = batch_.differentials[packet.ray[lane]].direction[i][axis] * medium_.unit;
+        }
+    }
+    packet.kick[lane] = ray.strength;
+    packet.length[lane] = 0;
+    packet.log_radiance_scale[lane] = 0;
+  }
+
+  /// Copies a ray, without the values that depend on its brick (see `begin`).
+  static void copy_lane(const Packet& from, int of, Packet& to, int lane) {
+    copy_state<differentials>(from.now, of, to.now, lane);
+    for (int axis = 0; axis < 3; ++axis) to.brick[axis][lane] = from.brick[axis][of];
+    to.kick[lane] = from.kick[of];
+    to.length[lane] = from.length[of];
+    to.log_radiance_scale[lane] = from.log_radiance_scale[of];
+    to.time[lane] = from.time[of];
+    to.wanted[lane] = from.wanted[of];
+    to.ray[lane] = from.ray[of];
+  }
+
+  /// Moves the remaining rays to the front if that frees a vector. The other lanes repeat one of these rays.
+  void compact(Packet& packet) {
+    const int count = static_cast<int>(hwy::PopCount(packet.alive));
+    if (count <= (packet.vectors - 1) * lanes) {
+      int to = 0;
+      for_lanes(packet.alive, [&](int lane) {
+        if (to != lane) copy_lane(packet, lane, packet, to);
+        ++to;
+      });
+      packet.vectors = (count + lanes - 1) / lanes;
+      packet.alive = ~0u >> (packet_rays - count);
+    }
+    const int of = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(packet.alive));
+    for (int lane = 0; lane < packet.vectors * lanes; ++lane)
+      if (!(packet.alive >> lane & 1)) copy_lane(packet, of, packet, lane);
+    begin(medium_, packet);
+  }
+
+  void fill(Packet& packet) {
+    if (next_ == rays_.size()) return;
+    const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
+    packet.alive = ~0u >> (packet_rays - count);
+    packet.vectors = packet_rays / lanes;
+    packet.steps = 0;
+    packet.step_limit = medium_.settings.max_steps;
+    alignas(64) PerRay norms = {};
+    for (int lane = 0; lane < count; ++lane) {
+      packet.ray[lane] = static_cast<std::int32_t>(next_++);
+      enter(packet, lane);
+      const KernelRay& ray = rays_[packet.ray[lane]];
+      norms[lane] = ray.norm;
+      packet.step_limit = std::min(packet.step_limit, medium_.settings.max_steps - ray.steps);
+    }
+    for (int i = 0; i < packet_rays; i += lanes)
+      store(index_direction(medium_, load(packet.now.v, i)), packet.now.u, i);
+    begin_steps(medium_, packet, norms);
+    if (count < packet_rays)
+      compact(packet);
+    else
+      begin(medium_, packet);
+  }
+
+  /// The lanes that cannot take this step, as bits. Sets those that meet a surface.
+  HWY_NOINLINE std::uint32_t stopped(Packet& packet) const {
+    std::uint32_t stop = 0;
+    for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+      const F3 v = load(packet.next.v, i);
+      stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // The ray has no direction.
+    }
+    if (!packet.near_surface && !medium_.bounded) return stop;
+    for_lanes(packet.alive, [&](int lane) {
+      const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Length of the path up to the field.
+      if (packet.length[lane] + packet.time[lane] + before >= medium_.settings.max_length)
+        stop |= 1u << lane;
+      else if (packet.near_surface && step_meets_surface(medium_, packet, lane))
+        packet.lands |= 1u << lane;
+    });
+    return stop | packet.lands;
+  }
+
+  /// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
+  /// packet counts.
+  HWY_NOINLINE std::uint32_t spent(const Packet& packet) const {
+    std::uint32_t result = 0;
+    for_lanes(packet.alive, [&](int lane) {
+      if (rays_[packet.ray[lane]].steps + packet.steps >= medium_.settings.max_steps) result |= 1u << lane;
+    });
+    return result;
+  }
+
+  /// Writes back the rays of some lanes, as they were before the step, and removes them from the packet.
+  HWY_NOINLINE void retire(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
+    Packet& leaving = leaving_[&packet - packets_];
+    for_lanes(stop | leave, [&](int lane) {
+      KernelRay& ray = rays_[packet.ray[lane]];
+      for (int axis = 0; axis < 3; ++axis) {
+        ray.place.brick[axis] = packet.brick[axis][lane];
+        ray.place.position[axis] = packet.now.p[axis][lane];
+        ray.direction[axis] = packet.now.v[axis][lane];
+        ray.end[axis] = packet.next.p[axis][lane];
+        ray.end_direction[axis] = packet.next.v[axis][lane];
+        if constexpr (differentials)
+          for (int i = 0; i < 2; ++i) {
+            batch_.differentials[packet.ray[lane]].position[i][axis] = packet.now.dp[i][axis][lane] / medium_.unit;
+            batch_.differentials[packet.ray[lane]].direction[i][axis] = packet.now.dv[i][axis][lane] / medium_.unit;
+          }
+      }
+      ray.length += double{packet.length[lane]};
+      ray.log_radiance_scale += packet.log_radiance_scale[lane];
+      ray.step = packet.time[lane];
+      ray.lands = (packet.lands & stop) >> lane & 1;
+      ray.steps += packet.steps;
+      packet.alive &= ~(1u << lane);
+      if (!(leave >> lane & 1)) return;
+      const int to = static_cast<int>(hwy::PopCount(leaving.alive));
+      copy_lane(packet, lane, leaving, to);
+      copy_state<differentials>(packet.next, lane, leaving.next, to);
+      leaving.alive = leaving.alive << 1 | 1;
+    });
+  }
+
+  /// Records the points of some lanes.
+  HWY_NOINLINE void keep_points(const Packet& packet, std::uint32_t which) {
+    alignas(64) float positions[packet_rays][4], directions[packet_rays][4];
+    alignas(64) std::int32_t bricks[packet_rays][4];
+    for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+      const F3 p = load(packet.now.p, i), v = load(packet.now.v, i);
+      hn::StoreInterleaved4(p.x, p.y, p.z, load(packet.length, i), floats, positions[i]);
+      hn::StoreInterleaved4(v.x, v.y, v.z, v.z, floats, directions[i]);
+      const auto brick = [&](int axis) HWY_ATTR { return hn::Load(ints, packet.brick[axis] + i); };
+      hn::StoreInterleaved4(brick(0), brick(1), brick(2), brick(2), ints, bricks[i]);
+    }
+    for_lanes(which, [&](int lane) {
+      auto* const point = reinterpret_cast<unsigned char*>(&batch_.points[packet.ray[lane]]->emplace_back());
+      std::memcpy(point + offsetof(StepPoint, position), positions[lane], sizeof positions[lane]);
+      std::memcpy(point + offsetof(StepPoint, direction), directions[lane], sizeof directions[lane]);
+      std::memcpy(point + offsetof(StepPoint, brick), bricks[lane], sizeof bricks[lane]);
+    });
+  }
+
+  /// Moves the rays to the ends of their steps.
+  HWY_INLINE void add_step(Packet& packet) {
+    for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+      store(load(packet.next.p, i), packet.now.p, i);
+      store(load(packet.next.v, i), packet.now.v, i);
+      store(load(packet.next.u, i), packet.now.u, i);
+      store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
+      if constexpr (differentials)
+        for (int k = 0; k < 2; ++k) {
+          store(load(packet.next.dp[k], i), packet.now.dp[k], i);
+          store(load(packet.next.dv[k], i), packet.now.dv[k], i);
+        }
+      else
+        store(hn::Add(load(packet.log_radiance_scale, i), load(packet.change_of_step, i)), packet.log_radiance_scale,
+              i);
+    }
+    ++packet.steps;
+  }
+
+  /// Takes a step, and takes out the rays that it ends, as they were before it.
+  HWY_NOINLINE void step(Packet& packet) {
+    find_times(medium_, packet);
+    std::uint32_t stop = too_short(medium_, packet);
+    take_step<components, differentials>(medium_, packet);
+    samples_ += hwy::PopCount(packet.alive) * static_cast<unsigned>(medium_.method.kicks);
+    const std::uint32_t staying = medium_.adaptive ? control_steps<differentials>(medium_, packet) : 0;
+    packet.lands = 0;
+    std::uint32_t leave = 0;
+    for (int axis = 0; axis < 3; ++axis) leave |= outside(medium_, packet, packet.next.p[axis], axis);
+    leave &= ~staying;
+    stop |= stopped(packet) & ~staying;
+    if (packet.steps >= packet.step_limit) stop |= spent(packet);
+    if constexpr (differentials) {  // The reference computes the differentials at a crossing.
+      stop |= leave;
+      packet.lands |= leave;
+      leave = 0;
+    }
+    const std::uint32_t between = outside_between(medium_, packet, leave) & ~staying;
+    packet.lands |= between;
+    stop = (stop | between) & packet.alive;
+    leave &= packet.alive & ~stop;
+    if ((stop | leave) != 0) retire(packet, stop, leave);
+    const std::uint32_t recorded = batch_.points.empty() ? 0 : packet.alive & ~staying;
+    for_lanes(recorded, [&](int lane) { add_inner_points(medium_, packet, lane, *batch_.points[packet.ray[lane]]); });
+    add_step(packet);
+    if (recorded != 0) keep_points(packet, recorded);
+    if ((stop | leave) != 0 && packet.alive != 0) compact(packet);
+  }
+
+  /// Repeats the step that leaves the extent, with the length that ends on its face.
+  HWY_NOINLINE void land(Packet& packet) {
+    packet.vectors = packet_rays / lanes;
+    for (int lane = static_cast<int>(hwy::PopCount(packet.alive)); lane < packet_rays; ++lane)
+      copy_state<differentials>(packet.next, 0, packet.next, lane);
+    compact(packet);
+    FaceLanding landing;
+    aim_along_chord(medium_, packet, landing);
+    aim_along_path(medium_, packet, landing);
+    take_step<components, differentials>(medium_, packet);
+    move_to_faces(medium_, packet, landing);
+    arrive(packet, landing);
+  }
+
+  /// Writes back the rays, which are on the extent's faces.
+  void arrive(Packet& packet, const FaceLanding& landing) {
+    for_lanes(packet.alive, [&](int lane) {
+      KernelRay& ray = rays_[packet.ray[lane]];
+      for (int axis = 0; axis < 3; ++axis) {
+        ray.place.brick[axis] = packet.brick[axis][lane];
+        ray.place.position[axis] = packet.next.p[axis][lane];
+        ray.direction[axis] = packet.next.v[axis][lane];
+      }
+      ray.axis = static_cast<std::int8_t>(landing.axis[lane]);
+      ray.length += double{packet.time[lane]};
+      ray.log_radiance_scale += packet.change_of_step[lane];
+      ++ray.steps;
+      samples_ += static_cast<unsigned>(medium_.method.kicks);
+    });
+    packet.alive = 0;
+  }
 
   const PacketMedium& medium_;
   std::vector<KernelRay>& rays_;
@@ -69,290 +307,6 @@ class Kernel {
   /// Rays of these packets that leave the extent, as they were before their last step, and the end of that step.
   Packet leaving_[in_flight];
 };
-
-/// Calls f(lane) for each lane of `which`.
-template <class Function>
-HWY_INLINE void for_lanes(std::uint32_t which, const Function& f) {
-  for (; which != 0; which &= which - 1) f(static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(which)));
-}
-
-/// Copies a ray into a lane.
-template <int components, bool differentials>
-void Kernel<components, differentials>::enter(Packet& packet, int lane) {
-  const KernelRay& ray = rays_[packet.ray[lane]];
-  for (int axis = 0; axis < 3; ++axis) {
-    packet.p[axis][lane] = ray.place.position[axis];
-    packet.v[axis][lane] = ray.direction[axis];
-    packet.brick[axis][lane] = ray.place.brick[axis];
-    if constexpr (differentials)
-      for (int i = 0; i < 2; ++i) {
-        packet.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis] * medium_.unit;
-        packet.dv[i][axis][lane] = batch_.differentials[packet.ray[lane]].direction[i][axis] * medium_.unit;
-      }
-  }
-  packet.kick[lane] = ray.strength;
-  packet.length[lane] = 0;
-  packet.log_radiance_scale[lane] = 0;
-}
-
-/// Copies a ray, without the values that depend on its brick (see `begin`).
-template <int components, bool differentials>
-void Kernel<components, differentials>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
-  for (int axis = 0; axis < 3; ++axis) {
-    to.p[axis][lane] = from.p[axis][of];
-    to.v[axis][lane] = from.v[axis][of];
-    to.u[axis][lane] = from.u[axis][of];
-    to.brick[axis][lane] = from.brick[axis][of];
-    if constexpr (differentials)
-      for (int i = 0; i < 2; ++i) {
-        to.dp[i][axis][lane] = from.dp[i][axis][of];
-        to.dv[i][axis][lane] = from.dv[i][axis][of];
-      }
-  }
-  to.kick[lane] = from.kick[of];
-  to.length[lane] = from.length[of];
-  to.log_radiance_scale[lane] = from.log_radiance_scale[of];
-  to.time[lane] = from.time[of];
-  to.wanted[lane] = from.wanted[of];
-  to.ray[lane] = from.ray[of];
-}
-
-/// Copies the end of a lane's step.
-template <int components, bool differentials>
-void Kernel<components, differentials>::copy_end(const Packet& from, int of, Packet& to, int lane) {
-  for (int axis = 0; axis < 3; ++axis) {
-    to.p_next[axis][lane] = from.p_next[axis][of];
-    to.v_next[axis][lane] = from.v_next[axis][of];
-    to.u_next[axis][lane] = from.u_next[axis][of];
-  }
-}
-
-/// Moves the remaining rays to the front if that frees a vector. The other lanes repeat one of these rays.
-template <int components, bool differentials>
-void Kernel<components, differentials>::compact(Packet& packet) {
-  const int count = static_cast<int>(hwy::PopCount(packet.alive));
-  if (count <= (packet.vectors - 1) * lanes) {
-    int to = 0;
-    for_lanes(packet.alive, [&](int lane) {
-      if (to != lane) copy_lane(packet, lane, packet, to);
-      ++to;
-    });
-    packet.vectors = (count + lanes - 1) / lanes;
-    packet.alive = ~0u >> (packet_rays - count);
-  }
-  const int of = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(packet.alive));
-  for (int lane = 0; lane < packet.vectors * lanes; ++lane)
-    if (!(packet.alive >> lane & 1)) copy_lane(packet, of, packet, lane);
-  begin(medium_, packet);
-}
-
-template <int components, bool differentials>
-void Kernel<components, differentials>::fill(Packet& packet) {
-  if (next_ == rays_.size()) return;
-  const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
-  packet.alive = ~0u >> (packet_rays - count);
-  packet.vectors = packet_rays / lanes;
-  packet.steps = 0;
-  packet.step_limit = medium_.settings.max_steps;
-  alignas(64) PerRay norms = {};
-  for (int lane = 0; lane < count; ++lane) {
-    packet.ray[lane] = static_cast<std::int32_t>(next_++);
-    enter(packet, lane);
-    const KernelRay& ray = rays_[packet.ray[lane]];
-    norms[lane] = ray.norm;
-    packet.step_limit = std::min(packet.step_limit, medium_.settings.max_steps - ray.steps);
-  }
-  for (int i = 0; i < packet_rays; i += lanes) store(index_direction(medium_, load(packet.v, i)), packet.u, i);
-  begin_steps(medium_, packet, norms);
-  if (count < packet_rays)
-    compact(packet);
-  else
-    begin(medium_, packet);
-}
-
-/// The lanes that cannot take this step, as bits. Sets those that meet a surface.
-template <int components, bool differentials>
-HWY_NOINLINE std::uint32_t Kernel<components, differentials>::stopped(Packet& packet) const {
-  std::uint32_t stop = 0;
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F3 v = load(packet.v_next, i);
-    stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // The ray has no direction.
-  }
-  if (!packet.near_surface && !medium_.bounded) return stop;
-  for_lanes(packet.alive, [&](int lane) {
-    const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Length of the path up to the field.
-    if (packet.length[lane] + packet.time[lane] + before >= medium_.settings.max_length)
-      stop |= 1u << lane;
-    else if (packet.near_surface && step_meets_surface(medium_, packet, lane))
-      packet.lands |= 1u << lane;
-  });
-  return stop | packet.lands;
-}
-
-/// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
-/// packet counts.
-template <int components, bool differentials>
-HWY_NOINLINE std::uint32_t Kernel<components, differentials>::spent(const Packet& packet) const {
-  std::uint32_t result = 0;
-  for_lanes(packet.alive, [&](int lane) {
-    if (rays_[packet.ray[lane]].steps + packet.steps >= medium_.settings.max_steps) result |= 1u << lane;
-  });
-  return result;
-}
-
-/// Writes back the rays of some lanes, as they were before the step, and removes them from the packet.
-template <int components, bool differentials>
-HWY_NOINLINE void Kernel<components, differentials>::retire(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
-  Packet& leaving = leaving_[&packet - packets_];
-  for_lanes(stop | leave, [&](int lane) {
-    KernelRay& ray = rays_[packet.ray[lane]];
-    for (int axis = 0; axis < 3; ++axis) {
-      ray.place.brick[axis] = packet.brick[axis][lane];
-      ray.place.position[axis] = packet.p[axis][lane];
-      ray.direction[axis] = packet.v[axis][lane];
-      ray.end[axis] = packet.p_next[axis][lane];
-      ray.end_direction[axis] = packet.v_next[axis][lane];
-      if constexpr (differentials)
-        for (int i = 0; i < 2; ++i) {
-          batch_.differentials[packet.ray[lane]].position[i][axis] = packet.dp[i][axis][lane] / medium_.unit;
-          batch_.differentials[packet.ray[lane]].direction[i][axis] = packet.dv[i][axis][lane] / medium_.unit;
-        }
-    }
-    ray.length += double{packet.length[lane]};
-    ray.log_radiance_scale += packet.log_radiance_scale[lane];
-    ray.step = packet.time[lane];
-    ray.lands = (packet.lands & stop) >> lane & 1;
-    ray.steps += packet.steps;
-    packet.alive &= ~(1u << lane);
-    if (!(leave >> lane & 1)) return;
-    const int to = static_cast<int>(hwy::PopCount(leaving.alive));
-    copy_lane(packet, lane, leaving, to);
-    copy_end(packet, lane, leaving, to);
-    leaving.alive = leaving.alive << 1 | 1;
-  });
-}
-
-/// Records the points of some lanes.
-template <int components, bool differentials>
-HWY_NOINLINE void Kernel<components, differentials>::keep_points(const Packet& packet, std::uint32_t which) {
-  alignas(64) float positions[packet_rays][4], directions[packet_rays][4];
-  alignas(64) std::int32_t bricks[packet_rays][4];
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F3 p = load(packet.p, i), v = load(packet.v, i);
-    hn::StoreInterleaved4(p.x, p.y, p.z, load(packet.length, i), floats, positions[i]);
-    hn::StoreInterleaved4(v.x, v.y, v.z, v.z, floats, directions[i]);
-    const auto brick = [&](int axis) HWY_ATTR { return hn::Load(ints, packet.brick[axis] + i); };
-    hn::StoreInterleaved4(brick(0), brick(1), brick(2), brick(2), ints, bricks[i]);
-  }
-  for_lanes(which, [&](int lane) {
-    auto* const point = reinterpret_cast<unsigned char*>(&batch_.points[packet.ray[lane]]->emplace_back());
-    std::memcpy(point + offsetof(StepPoint, position), positions[lane], sizeof positions[lane]);
-    std::memcpy(point + offsetof(StepPoint, direction), directions[lane], sizeof directions[lane]);
-    std::memcpy(point + offsetof(StepPoint, brick), bricks[lane], sizeof bricks[lane]);
-  });
-}
-
-/// Moves the rays to the ends of their steps.
-template <int components, bool differentials>
-HWY_INLINE void Kernel<components, differentials>::add_step(Packet& packet) {
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    store(load(packet.p_next, i), packet.p, i);
-    store(load(packet.v_next, i), packet.v, i);
-    store(load(packet.u_next, i), packet.u, i);
-    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
-    if constexpr (differentials)
-      for (int k = 0; k < 2; ++k) {
-        store(load(packet.dp_next[k], i), packet.dp[k], i);
-        store(load(packet.dv_next[k], i), packet.dv[k], i);
-      }
-    else
-      store(hn::Add(load(packet.log_radiance_scale, i), load(packet.change_of_step, i)), packet.log_radiance_scale, i);
-  }
-  ++packet.steps;
-}
-
-/// Takes a step, and takes out the rays that it ends, as they were before it.
-template <int components, bool differentials>
-HWY_NOINLINE void Kernel<components, differentials>::step(Packet& packet) {
-  find_times(medium_, packet);
-  std::uint32_t stop = too_short(medium_, packet);
-  take_step<components, differentials>(medium_, packet);
-  samples_ += hwy::PopCount(packet.alive) * static_cast<unsigned>(medium_.method.kicks);
-  const std::uint32_t staying = medium_.adaptive ? control_steps<differentials>(medium_, packet) : 0;
-  packet.lands = 0;
-  std::uint32_t leave = 0;
-  for (int axis = 0; axis < 3; ++axis) leave |= outside(medium_, packet, packet.p_next[axis], axis);
-  leave &= ~staying;
-  stop |= stopped(packet) & ~staying;
-  if (packet.steps >= packet.step_limit) stop |= spent(packet);
-  if constexpr (differentials) {  // The reference computes the differentials at a crossing.
-    stop |= leave;
-    packet.lands |= leave;
-    leave = 0;
-  }
-  const std::uint32_t between = outside_between(medium_, packet, leave) & ~staying;
-  packet.lands |= between;
-  stop = (stop | between) & packet.alive;
-  leave &= packet.alive & ~stop;
-  if ((stop | leave) != 0) retire(packet, stop, leave);
-  const std::uint32_t recorded = batch_.points.empty() ? 0 : packet.alive & ~staying;
-  for_lanes(recorded, [&](int lane) { add_inner_points(medium_, packet, lane, *batch_.points[packet.ray[lane]]); });
-  add_step(packet);
-  if (recorded != 0) keep_points(packet, recorded);
-  if ((stop | leave) != 0 && packet.alive != 0) compact(packet);
-}
-
-/// Repeats the step that leaves the extent, with the length that ends on its face.
-template <int components, bool differentials>
-HWY_NOINLINE void Kernel<components, differentials>::land(Packet& packet) {
-  packet.vectors = packet_rays / lanes;
-  for (int lane = static_cast<int>(hwy::PopCount(packet.alive)); lane < packet_rays; ++lane)
-    copy_end(packet, 0, packet, lane);
-  compact(packet);
-  FaceLanding landing;
-  aim_along_chord(medium_, packet, landing);
-  aim_along_path(medium_, packet, landing);
-  take_step<components, differentials>(medium_, packet);
-  move_to_faces(medium_, packet, landing);
-  arrive(packet, landing);
-}
-
-/// Writes back the rays, which are on the extent's faces.
-template <int components, bool differentials>
-void Kernel<components, differentials>::arrive(Packet& packet, const FaceLanding& landing) {
-  for_lanes(packet.alive, [&](int lane) {
-    KernelRay& ray = rays_[packet.ray[lane]];
-    for (int axis = 0; axis < 3; ++axis) {
-      ray.place.brick[axis] = packet.brick[axis][lane];
-      ray.place.position[axis] = packet.p_next[axis][lane];
-      ray.direction[axis] = packet.v_next[axis][lane];
-    }
-    ray.axis = static_cast<std::int8_t>(landing.axis[lane]);
-    ray.length += double{packet.time[lane]};
-    ray.log_radiance_scale += packet.change_of_step[lane];
-    ++ray.steps;
-    samples_ += static_cast<unsigned>(medium_.method.kicks);
-  });
-  packet.alive = 0;
-}
-
-template <int components, bool differentials>
-std::uint64_t Kernel<components, differentials>::run() {
-  for (Packet& packet : packets_) fill(packet);
-  for (bool busy = true; busy;) {
-    busy = false;
-    for (Packet& packet : packets_) {
-      if (packet.alive == 0) continue;
-      busy = true;
-      step(packet);
-      if (HWY_LIKELY(packet.alive != 0)) continue;
-      Packet& leaving = leaving_[&packet - packets_];
-      if (leaving.alive != 0) land(leaving);
-      fill(packet);
-    }
-  }
-  return samples_;
-}
 
 template <int components>
 std::uint64_t trace_components(const PacketMedium& medium, KernelRays& batch) {

@@ -3,15 +3,15 @@
 /// Traces many rays at once inside a cubic field, by `splitting4`: the default. (The same code has `splitting` with
 /// steps of a given length, which the search of the automatic scale uses.) Steps are those of scalar_tracer.h, in
 /// single precision and in the widest vectors of the processor. docs/dev/performance_notes.md explains the method. The
-/// code for vectors is in the headers *-inl.h, which are compiled once for each instruction set: a step is in
-/// packet_step-inl.h, the tensor at a point in packet_splines-inl.h.
+/// code for vectors is in the headers *-inl.h, which packet_kernel.cpp includes once for each instruction set: a step
+/// is in packet_step-inl.h, the tensor at a point in packet_splines-inl.h.
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
+#include "tracing/bending/geometry.h"
 #include "tracing/bending/ray_record.h"
 #include "volumes/bricks/tensor_field.h"
 
@@ -43,18 +43,14 @@ struct KernelRays {
   std::vector<std::vector<StepPoint>*> points;    ///< One list for every ray, to which the kernel adds; or empty.
 };
 
-/// Whether the step from one point to another meets a surface, so that packets cannot take it. Called where surfaces
-/// are near.
-using MeetsSurface = std::function<bool(const Eigen::Vector3d& from, const Eigen::Vector3d& to)>;
-
 struct KernelSettings {
   bool is_splitting = false;  ///< Whether the method is `splitting`, whose `step` must be given.
   float step = 0;             ///< Voxels; 0: automatic.
   float tolerance = 0;        ///< Of automatic steps, voxels.
   std::uint32_t max_steps = 0;
-  float max_length = 0;          ///< World units; limit of the whole path, `KernelRay::length` included.
-  MeetsSurface meets_surface;    ///< Null if there are no surfaces within the field.
-  Eigen::AlignedBox3d surfaces;  ///< Box around these surfaces, index space.
+  float max_length = 0;                ///< World units; limit of the whole path, `KernelRay::length` included.
+  const Geometry* geometry = nullptr;  ///< Packets do not take steps that meet its surfaces. Null: none in the field.
+  Eigen::AlignedBox3d surfaces;        ///< Box around these surfaces, index space.
 };
 
 /// Traces every ray to the face of the extent where it leaves (then `axis` is set and the ray is on that face), or to

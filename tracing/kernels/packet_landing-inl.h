@@ -1,21 +1,6 @@
 /// @file tracing/kernels/packet_landing-inl.h
 /// The last step of rays in the extent, which ends on a face of the extent, and the path within a step.
 
-// Included once for each instruction set: see Highway's foreach_target.h.
-#if defined(TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE) == defined(HWY_TARGET_TOGGLE)
-#ifdef TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE
-#undef TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE
-#else
-#define TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE
-#endif
-
-#include <hwy/highway.h>
-
-#include "tracing/kernels/packet_step-inl.h"
-
-HWY_BEFORE_NAMESPACE();
-namespace tensorray::packets::HWY_NAMESPACE {
-
 /// The last step of rays: the length of the whole step, which is too long, its chord, and the axis of the face where
 /// they leave.
 struct alignas(64) FaceLanding {
@@ -35,10 +20,10 @@ static HWY_NOINLINE void aim_along_chord(const PacketMedium& medium, Packet& pac
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F longest = load(packet.time, i);
     store(longest, landing.longest, i);
-    store(sub(load(packet.p_next, i), load(packet.p, i)), landing.chord, i);
+    store(sub(load(packet.next.p, i), load(packet.now.p, i)), landing.chord, i);
     const auto part = [&](int axis) HWY_ATTR {
       const F along = load(landing.chord[axis], i);
-      const F gap = hn::Sub(face(medium, packet, landing, axis, i), load(packet.p[axis], i));
+      const F gap = hn::Sub(face(medium, packet, landing, axis, i), load(packet.now.p[axis], i));
       return hn::IfThenElse(hn::Gt(hn::Abs(along), zero), hn::Div(gap, along), set(1e30f));
     };
     const F x = part(0), y = part(1), z = part(2), nearest = hn::Min(hn::Min(x, y), z);
@@ -56,9 +41,9 @@ static HWY_NOINLINE void aim_along_path(const PacketMedium& medium, Packet& pack
       return hn::IfThenElse(hn::Eq(axis, hn::Zero(floats)), v.x, hn::IfThenElse(hn::Eq(axis, one), v.y, v.z));
     };
     const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, i); };
-    const F from = of_axis(load(packet.p, i)), way = hn::Sub(of_axis(load(packet.p_next, i)), from);
+    const F from = of_axis(load(packet.now.p, i)), way = hn::Sub(of_axis(load(packet.next.p, i)), from);
     const F gap = hn::Sub(of_axis({on_face(0), on_face(1), on_face(2)}), from);
-    const F a = hn::Mul(longest, of_axis(load(packet.u, i))), b = hn::Mul(longest, of_axis(load(packet.u_next, i)));
+    const F a = hn::Mul(longest, of_axis(load(packet.now.u, i))), b = hn::Mul(longest, of_axis(load(packet.next.u, i)));
     // The path is a t + (3 way − 2 a − b) t² + (a + b − 2 way) t³.
     const F square = hn::Sub(hn::MulSub(three, way, hn::Mul(two, a)), b), cube = hn::NegMulAdd(two, way, hn::Add(a, b));
     F t = hn::Div(load(packet.time, i), longest);
@@ -81,11 +66,11 @@ static HWY_NOINLINE void move_to_faces(const PacketMedium& medium, Packet& packe
       return hn::IfThenElse(hn::Eq(axis, zero), a, hn::IfThenElse(hn::Eq(axis, set(1)), b, c));
     };
     const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, i); };
-    const F3 to = load(packet.p_next, i), u = load(packet.u_next, i);
+    const F3 to = load(packet.next.p, i), u = load(packet.next.u, i);
     const F gap = hn::Sub(of_axis(on_face(0), on_face(1), on_face(2)), of_axis(to.x, to.y, to.z));
     const F way = hn::Div(gap, of_axis(u.x, u.y, u.z));
     const F rest = hn::IfThenElseZero(hn::Le(hn::Abs(way), load(landing.longest, i)), way);
-    store(mul_add(rest, u, to), packet.p_next, i);
+    store(mul_add(rest, u, to), packet.next.p, i);
     store(hn::Add(load(packet.time, i), rest), packet.time, i);
   }
 }
@@ -97,8 +82,8 @@ HWY_INLINE F3 path_at(const Packet& packet, double t, int at) {
   const auto along = [&](double weight, const F3& v)
                          HWY_ATTR { return mul(hn::Mul(set(static_cast<float>(weight)), time), v); };
   const auto at_end = [&](double weight, const F3& p) HWY_ATTR { return mul(set(static_cast<float>(weight)), p); };
-  return add(add(at_end(weights.from, load(packet.p, at)), along(weights.from_direction, load(packet.u, at))),
-             add(at_end(weights.to, load(packet.p_next, at)), along(weights.to_direction, load(packet.u_next, at))));
+  return add(add(at_end(weights.from, load(packet.now.p, at)), along(weights.from_direction, load(packet.now.u, at))),
+             add(at_end(weights.to, load(packet.next.p, at)), along(weights.to_direction, load(packet.next.u, at))));
 }
 
 /// The lanes that turn on their way along an axis, or may do so, as bits: there the path's cubic polynomial may cross a
@@ -106,12 +91,12 @@ HWY_INLINE F3 path_at(const Packet& packet, double t, int at) {
 static HWY_NOINLINE std::uint32_t turning(const Packet& packet, int axis) {
   std::uint32_t result = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F way = hn::Sub(load(packet.p_next[axis], i), load(packet.p[axis], i)), time = load(packet.time, i);
+    const F way = hn::Sub(load(packet.next.p[axis], i), load(packet.now.p[axis], i)), time = load(packet.time, i);
     const auto is_steady = [&](const PerRay& slope) HWY_ATTR {  // Sufficient where it holds at both ends.
       const F part = hn::Div(hn::Mul(time, load(slope, i)), way);
       return hn::And(hn::Ge(part, hn::Zero(floats)), hn::Le(part, set(3)));
     };
-    result |= to_bits(hn::Not(hn::And(is_steady(packet.u[axis]), is_steady(packet.u_next[axis]))), i);
+    result |= to_bits(hn::Not(hn::And(is_steady(packet.now.u[axis]), is_steady(packet.next.u[axis]))), i);
   }
   return result;
 }
@@ -137,15 +122,10 @@ static HWY_NOINLINE std::uint32_t outside_between(const PacketMedium& medium, co
   for (int k = 0; k < 3; ++k)
     for (int i = 0; i < packet.vectors * lanes; i += lanes) store(path_at(packet, 0.25 * (k + 1), i), points[k], i);
   for (int axis = 0; axis < 3; ++axis) {
-    std::uint32_t along = outside(medium, packet, packet.p_next[axis], axis);
+    std::uint32_t along = outside(medium, packet, packet.next.p[axis], axis);
     for (const auto& point : points) along |= outside(medium, packet, point[axis], axis);
     edges |= along & (any | turning(packet, axis));
     any |= along;
   }
   return (any & ~leave) | edges;
 }
-
-}  // namespace tensorray::packets::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#endif

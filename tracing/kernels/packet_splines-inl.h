@@ -1,23 +1,6 @@
 /// @file tracing/kernels/packet_splines-inl.h
 /// The tensor at the sample points of a packet: sums of 4³ coefficients of cubic B-splines.
 
-// Included once for each instruction set: see Highway's foreach_target.h.
-#if defined(TENSORRAY_INTEGRATORS_PACKET_SPLINES_TOGGLE) == defined(HWY_TARGET_TOGGLE)
-#ifdef TENSORRAY_INTEGRATORS_PACKET_SPLINES_TOGGLE
-#undef TENSORRAY_INTEGRATORS_PACKET_SPLINES_TOGGLE
-#else
-#define TENSORRAY_INTEGRATORS_PACKET_SPLINES_TOGGLE
-#endif
-
-#include <type_traits>
-
-#include <hwy/highway.h>
-
-#include "tracing/kernels/packet_vectors-inl.h"
-
-HWY_BEFORE_NAMESPACE();
-namespace tensorray::packets::HWY_NAMESPACE {
-
 /// Weights of the four coefficients about each lane along each axis, and their derivatives.
 struct alignas(64) SplineWeights {
   float value[3][4][lanes], slope[3][4][lanes];
@@ -313,8 +296,3 @@ HWY_INLINE void sample_tensors(Packet& packet) {
       sample_cells<components>(packet, i);
   }
 }
-
-}  // namespace tensorray::packets::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#endif

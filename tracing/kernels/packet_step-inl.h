@@ -1,25 +1,6 @@
 /// @file tracing/kernels/packet_step-inl.h
-/// A step of a packet: its length, its drifts and kicks (`splitting4`, composition.h), and its error. It leads from p
-/// and v to p_next and v_next.
-
-// Included once for each instruction set: see Highway's foreach_target.h.
-#if defined(TENSORRAY_INTEGRATORS_PACKET_STEP_TOGGLE) == defined(HWY_TARGET_TOGGLE)
-#ifdef TENSORRAY_INTEGRATORS_PACKET_STEP_TOGGLE
-#undef TENSORRAY_INTEGRATORS_PACKET_STEP_TOGGLE
-#else
-#define TENSORRAY_INTEGRATORS_PACKET_STEP_TOGGLE
-#endif
-
-#include <cstdint>
-
-#include <hwy/contrib/math/math-inl.h>
-#include <hwy/highway.h>
-
-#include "tracing/kernels/packet_bricks-inl.h"
-#include "tracing/kernels/packet_splines-inl.h"
-
-HWY_BEFORE_NAMESPACE();
-namespace tensorray::packets::HWY_NAMESPACE {
+/// A step of a packet: its length, its drifts and kicks (`splitting4`, methods.h), and its error. It leads from `now`
+/// to `next`.
 
 // Template arguments: `components`: those of a tensor that the field stores. `differentials`: whether rays have
 // differentials.
@@ -37,7 +18,7 @@ HWY_INLINE F3 index_direction(const PacketMedium& medium, const F3& v) {
 
 /// |u|², voxels per `medium.unit`. (In world units, the squares may be beyond single precision.)
 HWY_INLINE F squared_voxels_per_unit(const PacketMedium& medium, const Packet& packet, int at) {
-  const F3 u = mul(set(medium.unit), load(packet.u, at));
+  const F3 u = mul(set(medium.unit), load(packet.now.u, at));
   return dot(u, u);
 }
 
@@ -63,7 +44,7 @@ static HWY_NOINLINE void begin_steps(const PacketMedium& medium, Packet& packet,
 static HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packet& packet) {
   const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
   const auto moves = [&](int i) HWY_ATTR {
-    const F3 p = load(packet.p, i);
+    const F3 p = load(packet.now.p, i);
     const auto beyond = [&](F x) HWY_ATTR { return hn::Or(hn::Lt(x, zero), hn::Ge(x, end)); };
     return hn::And(hn::Eq(load(packet.strongest, i), zero), hn::Or(beyond(p.x), hn::Or(beyond(p.y), beyond(p.z))));
   };
@@ -71,7 +52,7 @@ static HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packe
   for (int i = 0; i < packet.vectors * lanes; i += lanes) any |= to_bits(moves(i), i);
   if (any == 0) return;
   move_to_bricks(medium, packet, any, [&](int i) HWY_ATTR {
-    const F3 p = clamp(load(packet.p, i), load(packet.low, i), load(packet.high, i));
+    const F3 p = clamp(load(packet.now.p, i), load(packet.low, i), load(packet.high, i));
     return select(moves(i), p, zeros());
   });
 }
@@ -86,7 +67,7 @@ static HWY_NOINLINE void find_times(const PacketMedium& medium, Packet& packet) 
     if (packet.straight) {
       // The step ends a little beyond the brick where nothing bends light, so that rounding does not keep the ray in
       // the brick.
-      const F3 p = load(packet.p, i), u = load(packet.u, i);
+      const F3 p = load(packet.now.p, i), u = load(packet.now.u, i);
       const auto way = [&](F x, F along) HWY_ATTR {
         const F to = hn::Sub(hn::IfThenElse(hn::Gt(along, zero), end, zero), x);
         return hn::IfThenElse(hn::Eq(along, zero), set(1e30f), hn::Div(to, along));
@@ -149,22 +130,21 @@ HWY_INLINE F deviator_norm(const Tensor& T, F factor) {
   return hn::Sqrt(hn::IfThenElse(hn::Le(squares, set(1e38f)), deviator, squares));  // Infinity stays infinite.
 }
 
-/// Sets packet.v_next and packet.change_of_step of the lanes of `which`, whose kicks are too strong for the series.
+/// Sets packet.next.v and packet.change_of_step of the lanes of `which`, whose kicks are too strong for the series.
 template <int components>
 HWY_NOINLINE void kick_in_double(Packet& packet, const ComposedStep& step, float part, std::uint32_t which) {
-  for (; which != 0; which &= which - 1) {
-    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(which);
+  for_lanes(which, [&](int lane) {
     float T[9] = {}, v[3];
     for (int i = 0; i < 8; ++i) T[i] = packet.tensor[TensorBrick::stored_component(components, i)][lane];
     for (int axis = 0; axis < 3; ++axis) v[axis] = step.v[axis][lane];
     const StrongKick kick = strong_kick(T, part * packet.time[lane] * packet.kick[lane], v);
-    for (int axis = 0; axis < 3; ++axis) packet.v_next[axis][lane] = kick.direction[axis];
+    for (int axis = 0; axis < 3; ++axis) packet.next.v[axis][lane] = kick.direction[axis];
     packet.change_of_step[lane] = kick.log_radiance_scale;
-  }
+  });
 }
 
 /// exp(factor · T) V, normalised, and its Λ, for any strength. How a lane is computed depends on that lane alone. The
-/// results are stored, in packet.v_next and packet.change_of_step: a returned value would pass through memory in halves
+/// results are stored, in packet.next.v and packet.change_of_step: a returned value would pass through memory in halves
 /// of vectors, which stalls the processor.
 /// @param size  ‖factor · T‖, or an upper bound of it.
 template <int components, bool differentials>
@@ -189,14 +169,14 @@ HWY_INLINE void bend(Packet& packet, const ComposedStep& step, const Tensor& T, 
   }
   if constexpr (differentials) {
     // Rays with differentials stop where no series is exact enough.
-    store(mul(hn::IfThenElseZero(fits, scale), sum), packet.v_next, at);
+    store(mul(hn::IfThenElseZero(fits, scale), sum), packet.next.v, at);
   } else {
     F log_squared = log_near_one(e);
     if (!hn::AllTrue(floats, weak)) log_squared = hn::IfThenElse(weak, log_squared, hn::Log1p(floats, e));
     // Λ = factor tr T − 3 ln |exp(factor · T) V|. Adding c I to T does not change it.
     const F change = hn::MulAdd(factor, hn::Add(T.c[0], T.c[4]), hn::Mul(set(-1.5f), log_squared));
     store(change, packet.change_of_step, at);
-    store(mul(scale, sum), packet.v_next, at);
+    store(mul(scale, sum), packet.next.v, at);
     if (HWY_UNLIKELY(!hn::AllTrue(floats, fits)))
       kick_in_double<components>(packet, step, part, to_bits(hn::Not(fits), at));
   }
@@ -252,7 +232,7 @@ HWY_INLINE void kick(const PacketMedium& medium, Packet& packet, double part, Co
     } else {
       store(hn::Add(load(step.change, i), load(packet.change_of_step, i)), step.change, i);
     }
-    store(load(packet.v_next, i), step.v, i);
+    store(load(packet.next.v, i), step.v, i);
   }
 }
 
@@ -261,15 +241,15 @@ HWY_INLINE void kick(const PacketMedium& medium, Packet& packet, double part, Co
 template <bool differentials>
 HWY_INLINE void begin_step(const PacketMedium& medium, const Packet& packet, ComposedStep& step) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F3 v = load(packet.v, i);
+    const F3 v = load(packet.now.v, i);
     store(zeros(), step.ahead, i);
     store(v, step.v, i);
     store(mul(set(static_cast<float>(medium.method.error[0])), v), step.error, i);
     store(hn::Zero(floats), step.change, i);
     if constexpr (differentials)
       for (int k = 0; k < 2; ++k) {
-        store(load(packet.dp[k], i), step.dp[k], i);
-        store(load(packet.dv[k], i), step.dv[k], i);
+        store(load(packet.now.dp[k], i), step.dp[k], i);
+        store(load(packet.now.dv[k], i), step.dv[k], i);
       }
   }
 }
@@ -292,14 +272,14 @@ template <bool differentials>
 HWY_INLINE void end_step(const PacketMedium& medium, Packet& packet, const ComposedStep& step) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F3 v = load(step.v, i);
-    store(add(load(packet.p, i), load(step.ahead, i)), packet.p_next, i);
-    store(v, packet.v_next, i);
-    store(index_direction(medium, v), packet.u_next, i);
+    store(add(load(packet.now.p, i), load(step.ahead, i)), packet.next.p, i);
+    store(v, packet.next.v, i);
+    store(index_direction(medium, v), packet.next.u, i);
     store(load(step.change, i), packet.change_of_step, i);
     if constexpr (differentials)
       for (int k = 0; k < 2; ++k) {
-        store(load(step.dp[k], i), packet.dp_next[k], i);
-        store(load(step.dv[k], i), packet.dv_next[k], i);
+        store(load(step.dp[k], i), packet.next.dp[k], i);
+        store(load(step.dv[k], i), packet.next.dv[k], i);
       }
     const F3 error = load(step.error, i);
     const F squares = hn::Mul(dot(error, error), squared_voxels_per_unit(medium, packet, i));
@@ -316,7 +296,7 @@ HWY_NOINLINE void take_step(const PacketMedium& medium, Packet& packet) {
   bool near_surface = false;  // In any brick that is sampled.
   for (int n = 0; n < medium.method.kicks; ++n) {
     drift<differentials>(medium, packet, medium.method.drift[n], step);
-    locate(medium, packet, [&](int i) HWY_ATTR { return add(load(packet.p, i), load(step.ahead, i)); });
+    locate(medium, packet, [&](int i) HWY_ATTR { return add(load(packet.now.p, i), load(step.ahead, i)); });
     near_surface |= packet.near_surface;
     sample_tensors<components, differentials>(packet);
     kick<components, differentials>(medium, packet, medium.method.kick[n], step);
@@ -342,24 +322,22 @@ HWY_INLINE std::uint32_t too_short(const PacketMedium& medium, const Packet& pac
   return result;
 }
 
-/// Leaves a lane where it is.
+/// Copies a lane of one state to a lane of another.
 template <bool differentials>
-HWY_INLINE void hold(Packet& packet, int lane) {
-  packet.time[lane] = 0;
-  packet.change_of_step[lane] = 0;
+HWY_INLINE void copy_state(const RayState& from, int of, RayState& to, int lane) {
   for (int axis = 0; axis < 3; ++axis) {
-    packet.p_next[axis][lane] = packet.p[axis][lane];
-    packet.v_next[axis][lane] = packet.v[axis][lane];
-    packet.u_next[axis][lane] = packet.u[axis][lane];
+    to.p[axis][lane] = from.p[axis][of];
+    to.v[axis][lane] = from.v[axis][of];
+    to.u[axis][lane] = from.u[axis][of];
     if constexpr (differentials)
       for (int k = 0; k < 2; ++k) {
-        packet.dp_next[k][axis][lane] = packet.dp[k][axis][lane];
-        packet.dv_next[k][axis][lane] = packet.dv[k][axis][lane];
+        to.dp[k][axis][lane] = from.dp[k][axis][of];
+        to.dv[k][axis][lane] = from.dv[k][axis][of];
       }
   }
 }
 
-/// The next step divided by the last one: see step_lengths.h.
+/// The next step divided by the last one: see methods.h.
 HWY_INLINE F growth(F excess) {
   using namespace step_lengths;
   const auto single = [](double value) HWY_ATTR { return set(static_cast<float>(value)); };
@@ -377,15 +355,12 @@ HWY_NOINLINE std::uint32_t control_steps(const PacketMedium& medium, Packet& pac
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F excess = load(packet.excess, i), wanted = load(packet.wanted, i);
     store(hn::Min(hn::Mul(wanted, growth(excess)), set(medium.longest_step)), packet.wanted, i);
-    const F3 v = load(packet.v_next, i);  // A lane without a direction does not stay: it stops, whatever its error.
+    const F3 v = load(packet.next.v, i);  // A lane without a direction does not stay: it stops, whatever its error.
     staying |= to_bits(hn::And(hn::Gt(excess, set(1)), hn::Gt(dot(v, v), hn::Zero(floats))), i);
   }
-  for (std::uint32_t rest = staying; rest != 0; rest &= rest - 1)
-    hold<differentials>(packet, static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest)));
+  for_lanes(staying, [&](int lane) {
+    packet.time[lane] = packet.change_of_step[lane] = 0;
+    copy_state<differentials>(packet.now, lane, packet.next, lane);
+  });
   return staying;
 }
-
-}  // namespace tensorray::packets::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#endif

@@ -1,24 +1,6 @@
 /// @file tracing/kernels/packet_vectors-inl.h
 /// Vectors with a ray in each lane: arithmetic, and the order of numbers in them.
 
-// Included once for each instruction set: see Highway's foreach_target.h.
-#if defined(TENSORRAY_INTEGRATORS_PACKET_VECTORS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
-#ifdef TENSORRAY_INTEGRATORS_PACKET_VECTORS_TOGGLE
-#undef TENSORRAY_INTEGRATORS_PACKET_VECTORS_TOGGLE
-#else
-#define TENSORRAY_INTEGRATORS_PACKET_VECTORS_TOGGLE
-#endif
-
-#include <cstdint>
-#include <cstring>
-
-#include <hwy/highway.h>
-
-#include "tracing/kernels/packet.h"
-
-HWY_BEFORE_NAMESPACE();
-namespace tensorray::packets::HWY_NAMESPACE {
-
 namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::CappedTag<float, 16>;
 using Ints = hn::RebindToSigned<Floats>;
@@ -81,6 +63,12 @@ HWY_INLINE std::uint32_t to_bits(Mask mask, int at) {
 /// The bits of a vector's lanes, given those of the packet.
 HWY_INLINE std::uint32_t bits_of_vector(std::uint32_t packet, int at) { return packet >> at & ((1u << lanes) - 1); }
 
+/// Calls f(lane) for each lane of `which`.
+template <class Function>
+HWY_INLINE void for_lanes(std::uint32_t which, const Function& f) {
+  for (; which != 0; which &= which - 1) f(static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(which)));
+}
+
 /// The tensor whose stored component i is `stored(i)`.
 template <int components, class Stored>
 HWY_INLINE Tensor tensor_of(const Stored& stored) {
@@ -136,8 +124,3 @@ HWY_INLINE F row_of(const Sample& sample, int lane) {
   else
     return sample(lane);
 }
-
-}  // namespace tensorray::packets::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#endif

@@ -1,4 +1,4 @@
-#include "tracing/paths/path_samples.h"
+#include "tracing/paths/path_thinning.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@
 #include "base/process/job.h"
 #include "tracing/paths/joined_ray.h"
 #include "tracing/paths/path_thinning.h"
-#include "tracing/steps/path_tensors.h"
+#include "tracing/steps/scalar_tracer.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {

@@ -8,10 +8,8 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
-#include "tracing/bending/bending.h"
-#include "tracing/steps/composition.h"
 #include "tracing/steps/exponential.h"
-#include "tracing/steps/runge_kutta.h"
+#include "tracing/steps/methods.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray::bending_steps {
@@ -111,20 +109,9 @@ void kick(const RayMedium<N>& medium, double factor, State<N>& ray) {
   }
 }
 
+/// A step of `splitting` or `splitting4`. Sets the position of `error`.
 template <int N>
-State<N> splitting(RayMedium<N>& medium, const State<N>& from, double h) {
-  State<N> ray = from;
-  ray.P += h / 2 * ray.V;
-  medium.sample(ray.P);
-  kick(medium, h * medium.strength, ray);
-  ray.P += h / 2 * ray.V;
-  return ray;
-}
-
-/// A step of `splitting4`. Sets the position of `error`.
-template <int N>
-State<N> splitting4(RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
-  const Composition& method = splitting4_method;
+State<N> composed(const Composition& method, RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
   State<N> ray = from;
   error.P = h * method.error[0] * ray.V;
   error.V.setZero();
@@ -159,8 +146,8 @@ State<N> by_stages(const RungeKutta& method, RayMedium<N>& medium, const State<N
 template <int N>
 State<N> advance(BendingMethod method, RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
   if (const RungeKutta* const stages = runge_kutta(method)) return by_stages(*stages, medium, from, h, error);
-  if (method == BendingMethod::splitting4) return splitting4(medium, from, h, error);
-  return method == BendingMethod::euler ? euler(medium, from, h) : splitting(medium, from, h);
+  if (method == BendingMethod::euler) return euler(medium, from, h);
+  return composed(method == BendingMethod::splitting4 ? splitting4_method : splitting_method, medium, from, h, error);
 }
 
 }  // namespace tensorray::bending_steps

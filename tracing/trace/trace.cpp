@@ -1,76 +1,285 @@
 #include "tracing/trace/trace.h"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include <Eigen/Geometry>
+
+#include "base/geometry/box.h"
+#include "tracing/kernels/packet_kernel.h"
 #include "tracing/steps/scalar_tracer.h"
-#include "tracing/trace/packet_tracer.h"
+
+// Rays are traced in packets (packet_kernel.h) inside the field. The scalar tracer (scalar_tracer.h) does the rest, ray
+// by ray: the way to the field and behind it, steps that end on surfaces or are too short for single precision, and the
+// last step of rays with differentials. Where packets cannot trace a batch, it does all.
 
 namespace tensorray {
 namespace {
 
-template <int N>
-void trace_ray_by_ray(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                      RayBatch& batch, RayRecord* records) {
-  Tracer<N> tracer(field, geometry, settings);
-  for (std::size_t i = 0; i < batch.size(); ++i) {
-    const RayEnd end =
-        tracer.trace(start_of<N>(batch, i), strength_of(batch, i, settings), records ? &records[i].before : nullptr);
-    set_end(batch, i, end, tracer);
-  }
-  batch.tensor_samples += tracer.samples();
+using packets::KernelRay;
+using packets::KernelSettings;
+
+constexpr double face_margin = 1e-3;     // Voxels; above the error of single precision.
+constexpr double min_tolerance = 1e-5;   // Of automatic steps; below it, errors of single precision would show.
+constexpr double surface_margin = 4e-6;  // In sizes of the volume; above the margin of Geometry.
+
+/// A box around the surfaces that rays may meet within the field, in index space; empty if there are none.
+Eigen::AlignedBox3d surfaces_within(const TensorField& field, const Geometry& geometry) {
+  if (geometry.has_cut()) return field.index_bounds();
+  Eigen::AlignedBox3d volume = geometry.surfaces().bounds.bounds();
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(surface_margin * volume.diagonal().norm());
+  volume = Eigen::AlignedBox3d(volume.min() - margin, volume.max() + margin);
+  const Eigen::AlignedBox3d world = geometry.absorbers_within(volume);
+  return world.isEmpty() ? world : box_of(corners_of(world, field.to_index()));
 }
 
-void check(const BendingSettings& settings) {
+KernelSettings kernel_settings(const TensorField& field, const Geometry& geometry, const BendingSettings& settings) {
+  KernelSettings result;
+  result.is_splitting = settings.method == BendingMethod::splitting;
+  result.step = static_cast<float>(settings.step);
+  result.tolerance = static_cast<float>(settings.tolerance);
+  result.max_steps = static_cast<std::uint32_t>(settings.max_steps);
+  result.max_length = static_cast<float>(settings.max_length);
+  result.surfaces = surfaces_within(field, geometry);
+  if (!result.surfaces.isEmpty()) result.geometry = &geometry;
+  return result;
+}
+
+/// A batch while it is traced.
+struct TracedBatch {
+  packets::KernelRays kernel;
+  std::vector<std::size_t> numbers;  // Number, in the batch, of each ray of the kernel.
+  std::vector<Travelled> travelled;  // State of each ray before the kernel.
+};
+
+Eigen::Vector3d to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
+
+/// A ray at the point where it begins to bend, except for its strength.
+template <int N>
+KernelRay kernel_ray(const TensorField& field, Tracer<N>& tracer) {
+  KernelRay ray;
+  ray.place = brick_point(field, field.to_index() * Eigen::Vector3d(tracer.state().position()));
+  for (int axis = 0; axis < 3; ++axis) ray.direction[axis] = static_cast<float>(tracer.state().V(axis, 0));
+  return ray;
+}
+
+/// Whether the field may be so strong, where a ray begins to bend, that steps must be shorter.
+bool may_be_strong(const TensorField& field, const KernelRay& ray, double strength) {
+  const double longest_voxel = field.to_world().linear().norm();
+  const TensorBrick brick = field.brick({ray.place.brick[0], ray.place.brick[1], ray.place.brick[2]});
+  return std::abs(strength) * longest_voxel * brick.strongest > 0.1;
+}
+
+packets::KernelDifferential kernel_differential(const TensorField& field, const State<3>& state) {
+  const Eigen::Matrix<double, 3, 2> position = field.to_index().linear() * state.P.rightCols<2>();
+  packets::KernelDifferential result;
+  for (int i = 0; i < 2; ++i)
+    for (int axis = 0; axis < 3; ++axis) {
+      result.position[i][axis] = static_cast<float>(position(axis, i));
+      result.direction[i][axis] = static_cast<float>(state.V(axis, i + 1));
+    }
+  return result;
+}
+
+/// State of a ray after the kernel.
+template <int N>
+State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, std::size_t i) {
+  const KernelRay& ray = kernel.rays[i];
+  Eigen::Vector3d index = index_position(ray.place);
+  if (ray.axis >= 0) {
+    const Eigen::AlignedBox3d& box = field.index_bounds();
+    const int axis = ray.axis;
+    const double face = index[axis] > box.center()[axis] ? box.max()[axis] : box.min()[axis];
+    // Light nearly parallel to the face may end beside it.
+    if (std::abs(index[axis] - face) < face_margin) index[axis] = face;
+  }
+  State<N> state;
+  state.log_radiance_scale = ray.log_radiance_scale;
+  state.P.col(0) = field.to_world() * index;
+  state.V.col(0) = to_vector(ray.direction);
+  if constexpr (N == 3) {
+    for (int k = 0; k < 2; ++k)
+      for (int axis = 0; axis < 3; ++axis) {
+        state.P(axis, k + 1) = kernel.differentials[i].position[k][axis];
+        state.V(axis, k + 1) = kernel.differentials[i].direction[k][axis];
+      }
+    state.P.template rightCols<2>() = (field.to_world().linear() * state.P.template rightCols<2>()).eval();
+  }
+  return bending_steps::normalized(state);
+}
+
+/// Where the step of a ray ends that lands on a surface.
+template <int N>
+State<N> end_of_step(const TensorField& field, const KernelRay& ray) {
+  State<N> end{Eigen::Matrix<double, 3, N>::Zero(), Eigen::Matrix<double, 3, N>::Zero()};
+  end.P.col(0) = field.to_world() * index_position({ray.place.brick, ray.end});
+  end.V.col(0) = to_vector(ray.end_direction).normalized();
+  return end;
+}
+
+bool same_start(const RayBatch& batch, std::size_t i, std::size_t j) {
+  const bool same = batch.position[i] == batch.position[j] && batch.direction[i] == batch.direction[j];
+  return same &&
+         (batch.differentials.empty() || (batch.differentials[i].position == batch.differentials[j].position &&
+                                          batch.differentials[i].direction == batch.differentials[j].direction));
+}
+
+/// Where a ray is recorded before the kernel.
+PathPoints* before(RayRecord* records, std::size_t i) { return records ? &records[i].before : nullptr; }
+
+/// Moves the rays of the batch to the points where they begin to bend; rays of one origin are moved together. Sets the
+/// end of rays that do not reach the field.
+template <int N>
+void approach(const TensorField& field, const BendingSettings& settings, RayBatch& batch, RayRecord* records,
+              Tracer<N>& tracer, TracedBatch& traced) {
+  for (std::size_t i = 0; i < batch.size();) {
+    const std::size_t first = i;
+    const auto end = tracer.approach(start_of<N>(batch, first), before(records, first));
+    KernelRay ray = end ? KernelRay() : kernel_ray(field, tracer);
+    bool sampled = false;
+    std::size_t last = first + 1;
+    for (; last < batch.size() && same_start(batch, last, first); ++last)
+      if (records) records[last].before = records[first].before;
+    const auto state = tracer.state();
+    const Travelled travelled = tracer.travelled();
+    for (; i < last; ++i) {
+      const double strength = strength_of(batch, i, settings);
+      if (end || !std::isfinite(strength)) {
+        set_end(batch, i, std::isfinite(strength) ? *end : RayEnd::degenerate, tracer);
+        continue;
+      }
+      if (!sampled && may_be_strong(field, ray, strength)) {
+        ray.norm = static_cast<float>(tracer.deviator_here());
+        sampled = true;
+      }
+      ray.strength = static_cast<float>(strength);
+      ray.length = travelled.length;
+      ray.steps = travelled.steps;
+      traced.kernel.rays.push_back(ray);
+      if constexpr (N == 3) traced.kernel.differentials.push_back(kernel_differential(field, state));
+      traced.numbers.push_back(i);
+      traced.travelled.push_back(travelled);
+      if (!records) continue;
+      tracer.take_over(state, strength, travelled, before(records, i));
+      tracer.record(true);
+    }
+  }
+}
+
+/// Says where the kernel records the steps of its rays.
+void record_steps(RayRecord* records, TracedBatch& traced) {
+  if (!records) return;
+  for (const std::size_t number : traced.numbers) traced.kernel.points.push_back(&records[number].steps);
+}
+
+/// Follows ray i of the kernel from the point where the kernel stopped to its end.
+template <int N>
+RayEnd finish(const TensorField& field, const TracedBatch& traced, std::size_t i, double strength, RayRecord* records,
+              Tracer<N>& tracer) {
+  const KernelRay& ray = traced.kernel.rays[i];
+  const std::size_t number = traced.numbers[i];
+  Travelled travelled = traced.travelled[i];
+  travelled.length = ray.length;
+  travelled.steps = ray.steps;
+  RayRecord* const record = records ? &records[number] : nullptr;
+  tracer.take_over(state_of<N>(field, traced.kernel, i), strength, travelled, record ? &record->behind : nullptr);
+  if (ray.axis >= 0) {
+    if (tracer.state().direction().isZero()) return RayEnd::degenerate;
+    tracer.record(true);
+    return tracer.leave();
+  }
+  // The last point is recorded again.
+  if (record) record->steps.empty() ? record->before.pop_back() : record->steps.pop_back();
+  const State<N> end = end_of_step<N>(field, ray);
+  const bool is_known = ray.lands && end.P.allFinite() && !end.direction().isZero();
+  return tracer.follow(double{ray.step}, is_known ? &end : nullptr);
+}
+
+template <int N>
+void trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                      RayBatch& batch, RayRecord* records, Tracer<N>& tracer) {
+  TracedBatch traced;
+  approach(field, settings, batch, records, tracer, traced);
+  record_steps(records, traced);
+  batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), traced.kernel);
+  for (std::size_t i = 0; i < traced.numbers.size(); ++i) {
+    const std::size_t number = traced.numbers[i];
+    const RayEnd end = finish(field, traced, i, strength_of(batch, number, settings), records, tracer);
+    set_end(batch, number, end, tracer);
+  }
+}
+
+template <int N>
+void trace_ray_by_ray(const BendingSettings& settings, RayBatch& batch, RayRecord* records, Tracer<N>& tracer) {
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const RayEnd end = tracer.trace(start_of<N>(batch, i), strength_of(batch, i, settings), before(records, i));
+    set_end(batch, i, end, tracer);
+  }
+}
+
+/// Packets have `splitting4` in cubic fields, `splitting` with a given step there, and no automatic steps with a
+/// smaller tolerance.
+bool fits_packets(const TensorField& field, const BendingSettings& settings) {
+  const bool is_given = settings.step > 0;
+  const bool has_method = settings.method == BendingMethod::splitting4
+                              ? is_given || settings.tolerance >= min_tolerance
+                              : settings.method == BendingMethod::splitting && is_given;
+  return has_method && field.is_cubic() && packets::lane_count() > 1;
+}
+
+void check(const BendingSettings& settings, const RayBatch& batch) {
   if (!std::isfinite(settings.scale)) throw std::invalid_argument("the field's scale must be finite");
   if (!(settings.step >= 0) || !std::isfinite(settings.step))
     throw std::invalid_argument("bending.step must be automatic, or a positive number of voxels");
   if (!(settings.tolerance > 0)) throw std::invalid_argument("bending.tolerance must be positive");
   if (settings.max_steps < 1) throw std::invalid_argument("bending.max_steps must be positive");
   if (!(settings.max_length > 0)) throw std::invalid_argument("the greatest length of a ray must be positive");
+  if (!batch.differentials.empty() && batch.differentials.size() != batch.size())
+    throw std::invalid_argument("a batch must have differentials for every ray or for none");
+  if (!batch.differentials.empty() && batch.wants_log_radiance_scale)
+    throw std::invalid_argument("rays with differentials have no radiance change; leave out one of them");
 }
 
-bool has_differentials(const RayBatch& batch) { return !batch.differentials.empty(); }
-
-void prepare(const BendingSettings& settings, RayBatch& batch) {
-  check(settings);
-  if (has_differentials(batch) && batch.differentials.size() != batch.size())
-    throw std::invalid_argument("a batch must have differentials for every ray or for none");
-  if (has_differentials(batch) && batch.wants_log_radiance_scale)
-    throw std::invalid_argument("rays with differentials have no radiance change; leave out one of them");
+template <int N>
+void trace_all(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+               RayRecord* records, bool in_packets) {
   batch.end.resize(batch.size());
   batch.length.resize(batch.size());
   batch.steps.resize(batch.size());
   if (batch.wants_log_radiance_scale) batch.log_radiance_scale.resize(batch.size());
+  Tracer<N> tracer(field, geometry, settings);
+  if (in_packets)
+    trace_in_packets(field, geometry, settings, batch, records, tracer);
+  else
+    trace_ray_by_ray(settings, batch, records, tracer);
+  batch.tensor_samples += tracer.samples();
 }
 
-void trace_one_by_one(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                      RayBatch& batch, RayRecord* records) {
-  if (has_differentials(batch))
-    trace_ray_by_ray<3>(field, geometry, settings, batch, records);
+void trace_batch(const TensorField& field, const Geometry& geometry, const BendingSettings& wanted, RayBatch& batch,
+                 RayRecord* records, bool may_use_packets) {
+  const BendingSettings settings = resolved(wanted, field);
+  check(settings, batch);
+  const bool in_packets = may_use_packets && fits_packets(field, settings);
+  if (batch.differentials.empty())
+    trace_all<1>(field, geometry, settings, batch, records, in_packets);
   else
-    trace_ray_by_ray<1>(field, geometry, settings, batch, records);
+    trace_all<3>(field, geometry, settings, batch, records, in_packets);
 }
 
 }  // namespace
 
-void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& wanted, RayBatch& batch,
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
            std::vector<RayRecord>* records) {
-  const BendingSettings settings = resolved(wanted, field);
-  prepare(settings, batch);
-  if (records) records->resize(batch.size());
-  if (records) std::for_each(records->begin(), records->end(), [](RayRecord& record) { record.clear(); });
-  RayRecord* const first = records ? records->data() : nullptr;
-  if (!trace_in_packets(field, geometry, settings, batch, first))
-    trace_one_by_one(field, geometry, settings, batch, first);
+  if (records) {
+    records->resize(batch.size());
+    for (RayRecord& record : *records) record.clear();
+  }
+  trace_batch(field, geometry, settings, batch, records ? records->data() : nullptr, true);
 }
 
-void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& wanted,
+void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                      RayBatch& batch) {
-  const BendingSettings settings = resolved(wanted, field);
-  prepare(settings, batch);
-  trace_one_by_one(field, geometry, settings, batch, nullptr);
+  trace_batch(field, geometry, settings, batch, nullptr, false);
 }
 
 }  // namespace tensorray

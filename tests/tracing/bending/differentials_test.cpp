@@ -103,36 +103,21 @@ class RayDifferentials : public ::testing::TestWithParam<BendingMethod> {
   }
 };
 
-TEST_P(RayDifferentials, MatchFiniteDifferencesThroughTheVolume) {
-  Surfaces surfaces = test::surfaces_of(field_);
-  surfaces.plate = test::plate_across(direction_, 3);
-  expect_finite_differences(Geometry(surfaces), outside_, 0.5);
-}
-
-TEST_P(RayDifferentials, MatchOnATiltedPlateInsideTheVolume) {
-  Surfaces surfaces = test::surfaces_of(field_);
-  surfaces.plate = test::plate_across(Vector3d(0.5, 0.1, -1), 0.4);
-  expect_finite_differences(Geometry(surfaces), outside_, 0.5);
-}
-
-TEST_P(RayDifferentials, MatchFromInsideTheVolume) {
-  Surfaces surfaces = test::surfaces_of(field_);
-  surfaces.plate = test::plate_across(direction_, 3);
-  expect_finite_differences(Geometry(surfaces), make_start({0.1, 0.05, 0.3}, direction_, 0), -0.5);
-}
-
-TEST_P(RayDifferentials, MatchThroughACut) {
-  Surfaces surfaces = test::surfaces_of(field_);
+TEST_P(RayDifferentials, MatchFiniteDifferences) {
+  Surfaces behind = test::surfaces_of(field_), tilted = behind;
+  behind.plate = test::plate_across(direction_, 3);
+  tilted.plate = test::plate_across(Vector3d(0.5, 0.1, -1), 0.4);  // Inside the volume.
+  Surfaces cut = behind;
   Eigen::Affine3d turned = Eigen::Affine3d::Identity();
   turned.linear() = Eigen::AngleAxisd(0.5, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-  surfaces.cut = box_mesh(Eigen::AlignedBox3d(Vector3d::Constant(-0.5), Vector3d::Constant(0.5)), turned);
-  surfaces.plate = test::plate_across(direction_, 3);
-  expect_finite_differences(Geometry(surfaces), outside_, 0.5);
+  cut.cut = box_mesh(Eigen::AlignedBox3d(Vector3d::Constant(-0.5), Vector3d::Constant(0.5)), turned);
+  for (const Surfaces& surfaces : {behind, tilted, cut}) expect_finite_differences(Geometry(surfaces), outside_, 0.5);
+  expect_finite_differences(Geometry(behind), make_start({0.1, 0.05, 0.3}, direction_, 0), -0.5);
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryMethod, RayDifferentials,
-                         ::testing::Values(BendingMethod::euler, BendingMethod::splitting, BendingMethod::rk4,
-                                           BendingMethod::bs23, BendingMethod::dopri5));
+                         ::testing::Values(BendingMethod::euler, BendingMethod::splitting, BendingMethod::splitting4,
+                                           BendingMethod::rk4, BendingMethod::bs23, BendingMethod::dopri5));
 
 /// T = diag(a, b, 0): light along the z axis stays on it, and a beam near the axis spreads by δV' = s diag(a, b) δV.
 /// For parallel light δV begins at 0, so that it stays parallel. A beam that is not parallel is magnified.

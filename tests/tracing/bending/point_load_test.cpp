@@ -98,19 +98,5 @@ TEST(PointLoad, SampledRaysConvergeToTheAnalyticOnesAtSecondOrder) {
   }
 }
 
-TEST(PointLoad, TheDefaultMethodConvergesToo) {
-  const std::vector<Reference> references = read_references();
-  if (references.empty()) GTEST_SKIP() << "no reference rays at " << reference_file();
-  const TensorField field = sampled(161, Eigenvalues::absolute);
-  for (const Reference& reference : references) {
-    if (reference.mode != Eigenvalues::absolute) continue;
-    Surfaces surfaces = surfaces_of(field);
-    surfaces.plate = plate_across(reference.direction, std::abs(reference.plate));
-    const Ray ray = trace_one(field, Geometry(std::move(surfaces)), {}, reference.origin - reference.direction,
-                              reference.direction, reference.flexibility);
-    EXPECT_LT((ray.position - reference.landing).norm(), 1e-3);
-  }
-}
-
 }  // namespace
 }  // namespace tensorray

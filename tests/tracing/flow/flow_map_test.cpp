@@ -10,7 +10,6 @@
 
 #include "base/constants.h"
 #include "integrators/photon_distribution/photon_distribution.h"
-#include "renderer/spectra/spectrum.h"
 #include "tests/tracing/flow_support.h"
 #include "tracing/flow/ray_memory.h"
 #include "tracing/trace/trace.h"
@@ -201,76 +200,41 @@ TEST(FlowMap, InterpolatedLandingsAreThoseOfRays) {
     which.push_back(i * map.wavelengths + sample);
   }
   trace(bench.field, bench.geometry, {}, batch);
-  std::size_t compared = 0, near = 0;
+  std::size_t compared = 0, near = 0, nearest = 0;
   for (std::size_t k = 0; k < which.size(); ++k) {
     if (batch.end[k] != RayEnd::plate || map.ends[which[k]] != RayEnd::plate) continue;
     ++compared;
-    near += (bench.plate().to_pixel(batch.position[k]) - map.landings[which[k]].cast<double>()).norm() < 0.25;
+    const double apart = (bench.plate().to_pixel(batch.position[k]) - map.landings[which[k]].cast<double>()).norm();
+    near += apart < 0.25;
+    nearest += apart < 0.01;
   }
   EXPECT_GT(compared, 100u);
   // Vertices that were added in the middle of quads have the mean of the corners' landings.
   EXPECT_GT(static_cast<double>(near), 0.97 * static_cast<double>(compared));
+  EXPECT_GT(static_cast<double>(nearest), 0.7 * static_cast<double>(compared)) << "the prediction's own error";
 }
 
-/// The map with all samples traced, of the vertices that were traced at all (others lie in the middle of two).
-FlowMap with_all_samples(const FlowBench& bench, const FlowSettings& settings, FlowMap map) {
-  RayBatch batch;
-  for (const Vector2d& start : map.starts)
-    for (std::size_t sample = 0; sample < map.wavelengths; ++sample) {
-      const double part = static_cast<double>(sample) / static_cast<double>(map.wavelengths - 1);
-      batch.add(bench.beam.center + start.x() * bench.beam.right + start.y() * bench.beam.up, bench.beam.direction,
-                (1 - part) * settings.flexibilities[0] + part * settings.flexibilities[1]);
-    }
-  trace(bench.field, bench.geometry, {}, batch);
-  for (std::size_t first = 0; first < batch.size(); first += map.wavelengths) {
-    const auto landing = [&](std::size_t sample) -> Eigen::Vector2f {
-      return bench.plate().to_pixel(batch.position[first + sample]).cast<float>();
-    };
-    bool was_traced = true;
-    for (std::size_t sample = 0; sample < map.wavelengths; sample += map.wavelengths - 1)
-      was_traced = was_traced && batch.end[first + sample] == RayEnd::plate &&
-                   (landing(sample) - map.landings[first + sample]).norm() < 1e-3f;
-    for (std::size_t sample = 0; was_traced && sample < map.wavelengths; ++sample)
-      if (map.ends[first + sample] == RayEnd::plate) map.landings[first + sample] = landing(sample);
-  }
-  return map;
+/// Turns all light alike, to the right and upwards.
+Matrix3d turning(const Vector3d&) {
+  Matrix3d tensor = Matrix3d::Zero();
+  tensor(0, 2) = tensor(2, 0) = -0.3;
+  tensor(1, 2) = tensor(2, 1) = -0.15;
+  return tensor;
 }
 
-/// CIE L*a*b*, where `white` is white.
-Vector3d lab(const Vector3d& xyz, const Vector3d& white) {
-  Vector3d f;
-  for (int i = 0; i < 3; ++i) {
-    const double part = xyz[i] / white[i];
-    f[i] = part > 216.0 / 24389 ? std::cbrt(part) : (24389.0 / 27 * part + 16) / 116;
+TEST(FlowMap, SideLightOfARangeIsLeftOutAtEachWavelength) {
+  const FlowBench bench = make_bench(turning, plate_at(1.2, 8, 256));
+  FlowSettings settings = range(0, 1);
+  settings.side_light = false;
+  const FlowMap map = map_of(bench, settings);
+  double last = -1;
+  for (std::size_t sample = 0; sample < map.wavelengths; sample += 8) {  // Light bends more and more.
+    CausticBand band;
+    band.sample = static_cast<double>(sample);
+    const double side = power_of(caustic_of(bench, map, {band}), RayEnd::side);
+    EXPECT_GT(side, last) << sample;
+    last = side;
   }
-  return {116 * f.y() - 16, 500 * (f.x() - f.y()), 200 * (f.y() - f.z())};
-}
-
-TEST(FlowMap, InterpolatedWavelengthsHardlyChangeColours) {
-  constexpr int count = 64;
-  std::vector<CausticBand> bands;
-  Vector3d white = Vector3d::Zero();
-  for (int i = 0; i < count; ++i) {
-    const double place = (i + 0.5) / count;
-    bands.push_back({32 * place, 0, 0, 1.0 / count, observer(380 + 400 * place)});
-    white += bands.back().color;
-  }
-  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 64));
-  FlowSettings settings = range(0.1, 0.3);
-  settings.tolerance = 0.06;
-  const FlowMap few = map_of(bench, settings);
-  EXPECT_LT(static_cast<double>(few.rays), 0.3 * static_cast<double>(few.landings.size()));
-  const Film a = caustic_of(bench, few, bands).color,
-             b = caustic_of(bench, with_all_samples(bench, settings, few), bands).color;
-  double greatest = 0;
-  for (std::size_t i = 0; i < a.plane_size(); ++i) {
-    const auto at = [&](const Film& film) {
-      return lab({film.plane(0)[i], film.plane(1)[i], film.plane(2)[i]}, white);
-    };
-    greatest = std::max(greatest, (at(a) - at(b)).norm());
-  }
-  EXPECT_LT(greatest, 0.5);
-  EXPECT_GT(greatest, 0);
 }
 
 TEST(FlowMap, TheSameOnAnyNumberOfThreads) {
@@ -330,17 +294,12 @@ TEST(FlowMap, KeepsToItsNumberOfVertices) {
 
 TEST(FlowMap, BadSettingsAreRefused) {
   const FlowBench bench = make_bench(zero, plate_at(2, 3, 8));
-  FlowSettings settings;
-  EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
-  settings = single(0.1);
-  settings.range = true;
-  EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
-  settings = single(0.1);
-  settings.tolerance = std::nan("");
-  EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
-  settings = single(0.1);
-  settings.max_starts = 0;
-  EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
+  std::vector<FlowSettings> wrong(4, single(0.1));
+  wrong[0].flexibilities.clear();
+  wrong[1].range = true;
+  wrong[2].tolerance = std::nan("");
+  wrong[3].max_starts = 0;
+  for (const FlowSettings& settings : wrong) EXPECT_THROW(map_of(bench, settings), std::invalid_argument);
 }
 
 TEST(FlowMap, CanBeCancelled) {

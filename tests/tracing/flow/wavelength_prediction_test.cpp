@@ -34,8 +34,7 @@ double error_of(FlowMap map, const Parents& parents, std::size_t step, float tol
     map.landings[first + sample].setConstant(std::nanf(""));
     map.ends[first + sample] = RayEnd::missed;
   }
-  ExitFaces faces{};
-  if (!WavelengthPrediction(map, 2, parents, {100, 100}).predict(step, tolerance, faces)) return -1;
+  if (!WavelengthPrediction(map, 2, parents, {100, 100}).predict(step, tolerance)) return -1;
   float greatest = 0;
   for (std::size_t sample = 0; sample < range_samples; ++sample) {
     EXPECT_EQ(map.ends[first + sample], RayEnd::plate);
@@ -98,14 +97,11 @@ TEST(WavelengthPrediction, AKinkNeedsAllSamplesOnlyWhereItIs) {
   FlowMap map = small_map({0, 1, 0.5}, [](double x, double t) {
     return Vector2f(static_cast<float>(40 + x + 10 * std::max(t - 0.35, 0.0)), static_cast<float>(50 * t));
   });
-  ExitFaces faces{};
-  std::fill(faces.begin() + 12, faces.end(), std::uint8_t{1});
   WavelengthPrediction prediction(map, 2, {}, {100, 100});
-  for (const std::size_t step : {8, 4}) EXPECT_FALSE(prediction.predict(step, 0.02f, faces)) << step;
-  EXPECT_FALSE(prediction.predict(2, 0.02f, faces));
+  for (const std::size_t step : {8, 4, 2}) EXPECT_FALSE(prediction.predict(step, 0.02f)) << step;
   for (const std::size_t sample : {10, 11, 14}) EXPECT_TRUE(prediction.is_open(sample)) << sample;
   for (const std::size_t sample : {3, 18, 26, 31}) EXPECT_FALSE(prediction.is_open(sample)) << sample;
-  EXPECT_TRUE(prediction.predict(1, 0.02f, faces));
+  EXPECT_TRUE(prediction.predict(1, 0.02f));
 }
 
 /// Light of a parent that does not land says nothing about others.

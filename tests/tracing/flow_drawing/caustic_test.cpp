@@ -15,31 +15,6 @@ namespace {
 using namespace test;
 using Eigen::Vector2d;
 
-/// A map that is given, over a lattice of `count` × `count` quads of the unit square.
-template <class Map>
-FlowMap lattice_map(int count, const Map& map) {
-  FlowMap result;
-  for (int y = 0; y <= count; ++y)
-    for (int x = 0; x <= count; ++x) {
-      result.starts.emplace_back(double(x) / count, double(y) / count);
-      result.landings.push_back(map(result.starts.back()).template cast<float>());
-    }
-  result.ends.assign(result.starts.size(), RayEnd::plate);
-  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    const auto triangle = static_cast<std::uint32_t>(result.triangles.size());
-    result.triangles.push_back({{a, b, c}, 0.5 / count / count, false});
-    for (const auto& [from, to] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)})
-      result.edges.push_back({from, to, triangle});
-  };
-  for (int y = 0; y < count; ++y)
-    for (int x = 0; x < count; ++x) {
-      const auto a = static_cast<std::uint32_t>(y * (count + 1) + x), up = static_cast<std::uint32_t>(count + 1);
-      add(a, a + 1, a + up + 1);
-      add(a, a + up + 1, a + up);
-    }
-  return result;
-}
-
 /// L2 distance from `exact`, the power of each pixel, as a part of its norm. The power is exact.
 double distance(const FlowMap& map, const Plate& plate, const std::vector<double>& exact) {
   const Caustic caustic = draw_caustic(map, plate, {CausticBand{}}, {}, Progress());
@@ -63,8 +38,9 @@ Plate unit_plate() {
 /// A fold: x = c + k (u − ½)². The light of a column is the part of u that lands there, on both sides of the fold.
 double fold_error(int count) {
   constexpr double c = 10.3, k = 160;
-  const FlowMap map = lattice_map(
-      count, [&](const Vector2d& at) { return Vector2d(c + k * (at.x() - 0.5) * (at.x() - 0.5), 5 + 50 * at.y()); });
+  const FlowMap map = lattice_map(count, 0, 1, [&](const Vector2d& at) {
+    return Vector2d(c + k * (at.x() - 0.5) * (at.x() - 0.5), 5 + 50 * at.y());
+  });
   std::vector<double> exact(pixels * pixels);
   const auto below = [&](double x) { return 2 * std::sqrt(std::clamp((x - c) / k, 0.0, 0.25)); };
   for (int y = 5; y < 55; ++y)
@@ -84,8 +60,9 @@ TEST(Caustic, FoldHasItsClosedForm) {
 double cusp_error(int count) {
   constexpr double c = 32, k = 20;
   const auto cubic = [](double t, double v) { return t * t * t + t * (v - 0.5); };
-  const FlowMap map = lattice_map(
-      count, [&](const Vector2d& at) { return Vector2d(c + k * cubic(2 * at.x() - 1, at.y()), 2 + 60 * at.y()); });
+  const FlowMap map = lattice_map(count, 0, 1, [&](const Vector2d& at) {
+    return Vector2d(c + k * cubic(2 * at.x() - 1, at.y()), 2 + 60 * at.y());
+  });
   std::vector<double> exact(pixels * pixels);
   constexpr int lines = 60 * 64;  // Of v; 64 for each row of pixels.
   for (int line = 0; line < lines; ++line) {
@@ -120,8 +97,9 @@ TEST(Caustic, CuspHasItsClosedForm) {
 /// Away from folds the error is of second order in the size of the quads.
 TEST(Caustic, IsOfSecondOrderWhereNothingFolds) {
   const auto error = [](int count) {
-    const FlowMap map = lattice_map(
-        count, [](const Vector2d& at) { return Vector2d(5 + 40 * (at.x() + 0.3 * at.x() * at.x()), 4 + 54 * at.y()); });
+    const FlowMap map = lattice_map(count, 0, 1, [](const Vector2d& at) {
+      return Vector2d(5 + 40 * (at.x() + 0.3 * at.x() * at.x()), 4 + 54 * at.y());
+    });
     std::vector<double> exact(pixels * pixels);
     const auto start = [](double x) {  // The inverse of the map.
       const double s = std::clamp((x - 5) / 40, 0.0, 1.3);
@@ -139,7 +117,7 @@ TEST(Caustic, IsOfSecondOrderWhereNothingFolds) {
 
 /// The light of one band between two samples, of which each vertex moves by `moves`, and that of many narrow bands.
 std::pair<Film, Film> swept_and_narrow(const std::function<Vector2d(const Vector2d&)>& moves, int bands) {
-  FlowMap map = lattice_map(8, [](const Vector2d& at) { return Vector2d(5 + 20 * at.x(), 5 + 40 * at.y()); });
+  FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(5 + 20 * at.x(), 5 + 40 * at.y()); });
   std::vector<Eigen::Vector2f> landings;
   for (std::size_t i = 0; i < map.starts.size(); ++i)
     landings.insert(landings.end(), {map.landings[i], map.landings[i] + moves(map.starts[i]).cast<float>()});
@@ -241,7 +219,7 @@ TEST(Caustic, ChangesByLittleIfLandingsDo) {
 }
 
 TEST(Caustic, LightThatMovesFarHasManyBands) {
-  FlowMap map = lattice_map(2, [](const Vector2d& at) { return at; });
+  FlowMap map = lattice_map(2, 0, 1, [](const Vector2d& at) { return at; });
   map.wavelengths = 2;
   std::vector<Eigen::Vector2f> landings;
   for (const Eigen::Vector2f& at : map.landings) landings.insert(landings.end(), {at, at + Eigen::Vector2f(21, 0)});

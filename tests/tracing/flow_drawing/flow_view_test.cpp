@@ -3,39 +3,25 @@
 #include "tracing/flow_drawing/flow_view.h"
 
 #include <cmath>
-#include <functional>
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
+#include "tests/tracing/flow_support.h"
+
 namespace tensorray {
 namespace {
 
+using namespace test;
 using Eigen::Affine2d;
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::Vector2i;
 
-using Map = std::function<Vector2d(const Vector2d&)>;
-
 /// The map `landing` over the square of starts [-1, 1]², as a lattice of n × n quads.
+template <class Map>
 FlowMap lattice(const Map& landing, int n) {
-  FlowMap map;
-  for (int y = 0; y <= n; ++y)
-    for (int x = 0; x <= n; ++x) {
-      map.starts.emplace_back(2.0 * x / n - 1, 2.0 * y / n - 1);
-      map.landings.push_back(landing(map.starts.back()).cast<float>());
-      map.ends.push_back(RayEnd::plate);
-      map.lengths.push_back(static_cast<float>(map.starts.back().x()));
-    }
-  const double area = 2.0 / n / n;
-  for (int y = 0; y < n; ++y)
-    for (int x = 0; x < n; ++x) {
-      const auto a = static_cast<std::uint32_t>(y * (n + 1) + x), d = a + static_cast<std::uint32_t>(n) + 1;
-      map.triangles.push_back({{a, a + 1, d + 1}, area, 0, false});
-      map.triangles.push_back({{a, d + 1, d}, area, 0, false});
-    }
-  return map;
+  return lattice_map(n, -1, 1, landing);
 }
 
 /// All points of a picture, by row. `n` samples along each side of a pixel.

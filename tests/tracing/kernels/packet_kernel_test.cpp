@@ -48,15 +48,10 @@ TEST_P(PacketKernel, KeepsToAThousandthOfAVoxelOnLongWays) {
 }
 
 TEST_P(PacketKernel, FollowsFieldsOnAnyLattice) {
-  for (const Lattice& lattice : tested_lattices())
+  for (const Lattice& lattice : tested_lattices()) {
     for (const double step : {0.0, 0.25, 1.0})
       for (const double kick : {1e-4, 0.01, 0.1}) expect_reference(random_scene(lattice, step, kick, 24), 0.1);
-}
-
-/// `splitting` with a given step, which the search for the automatic scale uses.
-TEST_P(PacketKernel, FollowsFieldsBySplitting) {
-  for (const Lattice& lattice : tested_lattices()) {
-    Scene scene = random_scene(lattice, 1, 0.01, 24);
+    Scene scene = random_scene(lattice, 1, 0.01, 24);  // As the search for the automatic scale.
     scene.settings.method = BendingMethod::splitting;
     expect_reference(scene, 0.1);
   }
@@ -77,47 +72,17 @@ TEST_P(PacketKernel, FollowsStrongFields) {
   }
 }
 
-/// A strong constant field turns light to the direction that its exponential stretches most: the direction of a shear,
-/// or an eigenvector. No series in single precision converges there.
-TEST_P(PacketKernel, BendsHoweverStrongTheFieldIs) {
-  Matrix3d shear = Matrix3d::Zero();
-  shear(0, 1) = 1;
-  for (const Matrix3d& tensor : {shear, general_tensor(), Matrix3d(Vector3d(1, -2, 0.5).asDiagonal())}) {
-    TensorField field =
-        lattice_field(index_box({0, 0, 0}, {17, 17, 17}), lattices()[0], [&](const Vector3d&) { return tensor; });
-    Numbers numbers(17);
-    RayBatch rays;
-    for (int i = 0; i < 40; ++i)
-      add_bundle(rays, field, numbers.in({Vector3d::Constant(5), Vector3d::Constant(11)}), numbers.direction(),
-                 {3, 30});
-    Scene scene = make_scene("strong constant field", std::move(field), {}, 1, std::move(rays));
-    scene.settings.max_steps = 2;
-    const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
-    for (std::size_t i = 0; i < exact.size(); ++i) {
-      const double s = scene.rays.flexibility[i];
-      EXPECT_EQ(fast.end[i], exact.end[i]) << "ray " << i << ", s " << s;
-      EXPECT_LT((fast.direction[i] - exact.direction[i]).norm(), 1e-3) << "ray " << i << ", s " << s;
-    }
+TEST_P(PacketKernel, CrossesSparseFieldsAndFewVoxels) {
+  for (const Lattice& lattice : tested_lattices()) {
+    const auto expect = [&](TensorField field, double kick) {
+      RayBatch rays = random_rays(field, 24, wavelengths(kick), 47);
+      expect_as_exact_as_reference(make_scene(lattice.name, std::move(field), {}, 0, std::move(rays)));
+    };
+    const TensorGrid grid = lattice_grid(index_box({-16, 8, -32}, {64, 56, 64}), lattice, smooth_tensor(45));
+    for (const double fraction : {0.5, 0.9}) expect(cubic_field(without_blocks(grid, fraction, 46)), 0.1);
+    for (const Vector3i& voxels : {Vector3i(1, 30, 20), Vector3i(30, 1, 1), Vector3i(2, 3, 2), Vector3i(10, 9, 17)})
+      expect(lattice_field(index_box({7, -1, -9}, voxels), lattice, smooth_tensor(48)), 0.3);
   }
-}
-
-TEST_P(PacketKernel, CrossesSparseFields) {
-  for (const Lattice& lattice : tested_lattices())
-    for (const double fraction : {0.5, 0.9}) {
-      const TensorGrid grid = lattice_grid(index_box({-16, 8, -32}, {64, 56, 64}), lattice, smooth_tensor(45));
-      TensorField field = cubic_field(without_blocks(grid, fraction, 46));
-      RayBatch rays = random_rays(field, 24, wavelengths(0.1), 47);
-      expect_as_exact_as_reference(make_scene(lattice.name + ", sparse", std::move(field), {}, 0, std::move(rays)));
-    }
-}
-
-TEST_P(PacketKernel, CrossesFieldsOfFewVoxels) {
-  for (const Lattice& lattice : tested_lattices())
-    for (const Vector3i& voxels : {Vector3i(1, 30, 20), Vector3i(30, 1, 1), Vector3i(2, 3, 2), Vector3i(10, 9, 17)}) {
-      TensorField field = lattice_field(index_box({7, -1, -9}, voxels), lattice, smooth_tensor(48));
-      RayBatch rays = random_rays(field, 24, wavelengths(0.3), 49);
-      expect_as_exact_as_reference(make_scene(lattice.name + ", few voxels", std::move(field), {}, 0, std::move(rays)));
-    }
 }
 
 /// Rays all over the loaded face of a point load; every tenth bundle is directly under the load.
@@ -291,25 +256,6 @@ TEST_P(PacketKernel, RaysDoNotDependOnTheirNeighbours) {
   }
 }
 
-TEST_P(PacketKernel, RecordsTheSameRays) {
-  const Scene scene = random_scene(lattices()[2], 0, 0.05, 16);
-  RayBatch recorded = scene.rays;
-  std::vector<RayRecord> records;
-  trace(scene.field, scene.geometry, scene.settings, recorded, &records);
-  const RayBatch alone = traced(scene, scene.rays);
-  for (std::size_t i = 0; i < alone.size(); ++i) {
-    EXPECT_TRUE(identical(recorded, i, alone, i)) << "ray " << i;
-    // The first two and the last two points are on surfaces or outside the field.
-    const PathPoints points = points_of(scene.field, records[i]);
-    for (std::size_t k = 3; k + 3 < points.size(); ++k) {
-      const double chord = (points[k].position - points[k - 1].position).norm();
-      const double length = points[k].length - points[k - 1].length;
-      EXPECT_GT(length, 0) << "ray " << i << ": a step that is repeated is no point";
-      EXPECT_LE(chord, length * (1 + 1e-4) + 1e-7);
-    }
-  }
-}
-
 /// Λ is the same to single precision; that it is wanted changes no ray.
 TEST_P(PacketKernel, KnowsTheChangeOfRadiance) {
   for (const double kick : {1e-3, 0.05, 0.5}) {
@@ -331,23 +277,6 @@ TEST_P(PacketKernel, KnowsTheChangeOfRadiance) {
     EXPECT_GT(greatest, kick);
     EXPECT_GT(compared, static_cast<int>(all.size()) / 2);
   }
-}
-
-/// Adding c(P) I to T changes no ray and no Λ.
-TEST_P(PacketKernel, IsotropicTensorsChangeNoRadiance) {
-  const TensorFunction smooth = smooth_tensor(41);
-  const auto changes = [&](double c) {
-    TensorField field = lattice_field(index_box({0, 0, 0}, {24, 24, 24}), lattices()[0], [&](const Vector3d& p) {
-      return Matrix3d(0.1 * (smooth(p) + c * p.x() * Matrix3d::Identity()));
-    });
-    RayBatch rays = random_rays(field, 16, {0.3, -1}, 42);
-    rays.wants_log_radiance_scale = true;
-    const Scene scene = make_scene("isotropic", std::move(field), {}, 0, std::move(rays));
-    return traced(scene, scene.rays).log_radiance_scale;
-  };
-  const std::vector<double> without = changes(0), with = changes(1);
-  for (std::size_t i = 0; i < with.size(); ++i) EXPECT_NEAR(with[i], without[i], 1e-3) << "ray " << i;
-  EXPECT_GT(*std::max_element(without.begin(), without.end()), 0.1);
 }
 
 /// Rays with derivatives, along a parallel shift and along a shift with a turn.
@@ -435,15 +364,6 @@ TEST_P(PacketKernel, SymmetricTensorsBendRaysAsIfTheyWereGeneral) {
   }
 }
 
-/// The number of faces between bricks that the segment from one point to another crosses, index space.
-int faces_between_bricks(const Vector3d& from, const Vector3d& to) {
-  int faces = 0;
-  for (int axis = 0; axis < 3; ++axis)
-    faces +=
-        std::abs(int(std::floor(from[axis] / TensorBrick::cells)) - int(std::floor(to[axis] / TensorBrick::cells)));
-  return faces;
-}
-
 TEST_P(PacketKernel, BricksOfZerosTakeOneStepEach) {
   for (const Lattice& lattice : lattices()) {
     const auto zero = [](const Vector3d&) { return Matrix3d::Zero().eval(); };
@@ -455,39 +375,6 @@ TEST_P(PacketKernel, BricksOfZerosTakeOneStepEach) {
       EXPECT_GE(steps, 8u);
       EXPECT_LE(steps, 9u);  // One more where rounding at the face of entry decides.
     }
-
-    const RayBatch oblique = random_rays(scene.field, 100, {0.1, 0.2, 0.3}, 31), ends = traced(scene, oblique);
-    for (std::size_t i = 0; i < ends.size(); ++i) {
-      // From where light enters; the path is straight.
-      const auto entry = scene.geometry.crossing(Surface::bounds, true, oblique.position[i], oblique.direction[i]);
-      const Vector3d from = entry && !scene.field.contains(oblique.position[i])
-                                ? Vector3d(oblique.position[i] + entry->distance * oblique.direction[i])
-                                : oblique.position[i];
-      const int faces = faces_between_bricks(scene.field.to_index() * from, scene.field.to_index() * ends.position[i]);
-      EXPECT_LE(ends.steps[i], faces + 2u) << "ray " << i;  // One more where rounding at the last face decides.
-    }
-  }
-}
-
-TEST(PacketKernel, InstructionSetsAgree) {
-  for (const Lattice& lattice : lattices()) {
-    TensorField field = lattice_field(index_box({-13, 5, -30}, {37, 41, 50}), lattice, smooth_tensor(25));
-    RayBatch rays = random_rays(field, 60, {0.001, 0.02, -0.1}, 26);
-    const Scene scene = make_scene(lattice.name, std::move(field), {}, 0, std::move(rays));
-    const RayBatch moved = traced_by_reference(scene, turned_a_little(scene));
-    const RayBatch exact = traced_by_reference(scene, scene.rays);
-    const RayBatch best = traced(scene, scene.rays);
-    for (const std::string& name : packets::instruction_sets()) {
-      packets::use_instruction_set(name);
-      if (name == "SSE2") {  // It has no fused multiply-adds: other roundings decide about steps.
-        expect_as_exact_as_reference(scene);
-        continue;
-      }
-      const RayBatch other = traced(scene, scene.rays);
-      for (std::size_t i = 0; i < other.size(); ++i)
-        EXPECT_TRUE(!agree(moved, exact, i) || agree(other, best, i)) << name << ", ray " << i;
-    }
-    packets::use_instruction_set({});
   }
 }
 

@@ -140,21 +140,6 @@ TEST(CrossSection, TransportAlongAHelixUnwindsItsTorsion) {
   EXPECT_NEAR(std::log2(error(32) / error(64)), 4, 0.2);
 }
 
-TEST(CrossSection, CirclesAlongAHelixDoNotTwist) {
-  PathPoints points;
-  for (int i = 0; i <= 200; ++i) points.push_back(helix_point(0.05 * i, Matrix3d::Identity()));
-  const std::vector<CrossSection> sections = cross_sections(points, radii(0.01));
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    const Vector3d carried = transported(sections[i - 1].x, points[i - 1].position, points[i - 1].direction,
-                                         points[i].position, points[i].direction);
-    EXPECT_LT((sections[i].x - carried).norm(), 1e-12);
-    EXPECT_LT((sections[i].major - sections[i].x).norm(), 1e-6);
-    // No turn beyond the direction's own.
-    EXPECT_LT((sections[i].x - sections[i - 1].x).norm(),
-              1.0001 * (points[i].direction - points[i - 1].direction).norm());
-  }
-}
-
 TEST(CrossSection, PassingThroughACircleNeitherFlipsNorTwists) {
   // From 2 : 1 through a circle to 1 : 2: the longer axis changes places, the surface does not.
   const PathPoints points =

@@ -18,29 +18,21 @@ AutoScale scale_of(const TensorField& field, const Vector3d& direction = {0, 0, 
                       silhouette_beam(field.corners(), direction, Vector3d::UnitY()), Progress());
 }
 
-TEST(AutoScale, CancelsTheUnitsOfTheField) {
-  const AutoScale one = scale_of(cube_field(9, linear_tensor));
-  EXPECT_GT(one.shown, 0.3);
-  EXPECT_GT(one.bent_fraction, 0.99);
-  for (const double size : {1e-6, 1e6}) {
-    const TensorField field = cube_field(9, [&](const Vector3d& p) { return Matrix3d(size * linear_tensor(p)); });
-    EXPECT_NEAR(scale_of(field).scale * size / one.scale, 1, 1e-3);
-  }
-}
-
-/// Squares of these lengths, or of their inverses, are beyond single precision.
-TEST(AutoScale, CancelsTheUnitOfLength) {
+/// Of the field and of length. Squares of these lengths, or of their inverses, are beyond single precision.
+TEST(AutoScale, CancelsTheUnits) {
   const Interpolant interpolants[] = {{}, {Interpolation::cubic, Border::fade}};
   for (const Interpolant& interpolant : interpolants) {
-    const auto field_of_size = [&](double size) {
+    const auto scale_with = [&](double size, double strength) {
       const Eigen::Affine3d placement(Eigen::Scaling(size));
-      const auto tensor = [&](const Vector3d& p) { return linear_tensor(p / size); };
-      return TensorField(cube_grid({9, 9, 9}, tensor, placement), interpolant);
+      const auto tensor = [&](const Vector3d& p) { return Matrix3d(strength * linear_tensor(p / size)); };
+      return scale_of(TensorField(cube_grid({9, 9, 9}, tensor, placement), interpolant));
     };
-    const AutoScale one = scale_of(field_of_size(1));
-    for (const double size : {1e-12, 1e19, 1e26}) {
-      const AutoScale scaled = scale_of(field_of_size(size));
-      EXPECT_NEAR(scaled.scale * size / one.scale, 1, 1e-3) << size;
+    const AutoScale one = scale_with(1, 1);
+    EXPECT_GT(one.shown, 0.3);
+    EXPECT_GT(one.bent_fraction, 0.99);
+    for (const auto& [size, strength] : {std::pair(1e-12, 1.0), {1e19, 1.0}, {1e26, 1.0}, {1.0, 1e-6}, {1.0, 1e6}}) {
+      const AutoScale scaled = scale_with(size, strength);
+      EXPECT_NEAR(scaled.scale * size * strength / one.scale, 1, 1e-3) << size;
       EXPECT_NEAR(scaled.shown, one.shown, 1e-3) << size;
     }
   }

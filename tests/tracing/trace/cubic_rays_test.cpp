@@ -123,16 +123,6 @@ TEST(CubicRays, VoxelsAreOfOrderFour) {
   EXPECT_LT(fine, 0.5 * error(129, linear)) << "64 times fewer voxels";
 }
 
-/// A fourth-order step of four voxels (six samples) is more exact than eight steps of half a voxel of `splitting`.
-TEST(CubicRays, FewLongStepsAreMoreExactThanManyShortOnes) {
-  const TensorField field = field_of(formula, 33, cubic);
-  const std::vector<Ray> truth = true_rays(formula);
-  const double interpolation = distance(field, settings_for(BendingMethod::splitting4, 0.25), truth);
-  const double few = distance(field, settings_for(BendingMethod::splitting4, 4), truth),
-               many = distance(field, settings_for(BendingMethod::splitting, 0.5), truth);
-  EXPECT_LT(few - interpolation, many);
-}
-
 /// Automatic steps follow the tolerance.
 TEST(CubicRays, TheErrorFollowsTheTolerance) {
   const TensorField field = field_of(formula, 33, cubic);
@@ -171,55 +161,6 @@ TEST(CubicRays, ConstantTensors) {
   const Ray ray = trace_one(isotropic, Geometry(surfaces_of(isotropic)), settings_for(BendingMethod::automatic, 0),
                             {0, 0, -0.2}, direction, 0.2);
   EXPECT_LT((ray.direction - direction).norm(), 1e-12);
-}
-
-/// The path retraced from its end with −V and −s returns, to the order of the method.
-TEST(CubicRays, Reversal) {
-  const TensorField field = field_of(formula, 33, cubic);
-  const Geometry geometry(surfaces_of(field));
-  for (const Start& start : starts()) {
-    const BendingSettings settings = settings_for(BendingMethod::automatic, 0);
-    const Ray there = trace_one(field, geometry, settings, start.position, start.direction, flexibility);
-    const Ray back = trace_one(field, geometry, settings, there.position, -there.direction, -flexibility);
-    EXPECT_LT((back.position - start.position).norm(), 1e-3 * voxel_size(field));
-    EXPECT_LT((back.direction + start.direction).norm(), 1e-4);
-  }
-}
-
-/// Derivatives are those of the rays: central differences agree to the square of their distance.
-TEST(CubicRays, DifferentialsAreDerivatives) {
-  const TensorField field = field_of(formula, 17, cubic);
-  const Geometry geometry(surfaces_of(field));
-  const BendingSettings settings = settings_for(BendingMethod::splitting4, 1);
-  for (const Start& start : starts()) {
-    const Vector3d across = upright(start.direction, Vector3d::UnitX());
-    RayBatch batch;
-    batch.add(start.position, start.direction, flexibility);
-    RayDifferential differential;
-    differential.position.col(0) = across;
-    differential.direction.col(1) = across;
-    batch.differentials = {differential};
-    RayBatch packets = batch;
-    trace_reference(field, geometry, settings, batch);
-    trace(field, geometry, settings, packets);
-    const double d = 1e-4;
-    const auto moved = [&](double shift, double turn) {
-      return trace_one(field, geometry, settings, start.position + shift * across, start.direction + turn * across,
-                       flexibility);
-    };
-    const Ray right = moved(d, 0), left = moved(-d, 0), up = moved(0, d), down = moved(0, -d);
-    const auto expect = [&](const Ray& a, const Ray& b, int column) {
-      for (const RayBatch* rays : {&batch, &packets}) {
-        const double tolerance = rays == &batch ? 1e-5 : 1e-4;
-        EXPECT_LT(((a.position - b.position) / (2 * d) - rays->differentials[0].position.col(column)).norm(),
-                  tolerance);
-        EXPECT_LT(((a.direction - b.direction) / (2 * d) - rays->differentials[0].direction.col(column)).norm(),
-                  tolerance);
-      }
-    };
-    expect(right, left, 0);
-    expect(up, down, 1);
-  }
 }
 
 }  // namespace
