@@ -1,6 +1,6 @@
 /// @file tools/tensorray.cpp
 /// The program `tensorray`: selects the command.
-///   tensorray --read-mesh EXCHANGE FILE    a mesh → the file that renderer/meshes/assimp_mesh.h describes, which alone
+///   tensorray --read-mesh EXCHANGE FILE    a mesh → the file that renderer/meshes/assimp_mesh.cpp reads, which alone
 ///                                          uses this
 
 #include <stdexcept>
@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "renderer/meshes/assimp_mesh.h"
+#include "renderer/meshes/mesh_readers.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"

@@ -8,7 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "renderer/color/color.h"
-#include "renderer/meshes/mesh_files.h"
+#include "renderer/meshes/mesh.h"
 #include "tracing/paths/cross_section.h"
 
 namespace tensorray {

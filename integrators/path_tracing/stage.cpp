@@ -14,16 +14,17 @@ constexpr float nothing_depth = 1e10f;  // Depth of pixels that show nothing: be
 /// What is known of a pixel.
 struct SurfacePixel {
   const SurfacePicture& picture;
+  const PixelState& state;
   std::size_t index;
   Eigen::Vector3f radiance;  ///< In the working space.
   Eigen::Vector3f color;     ///< The same before the background.
   float alpha;               ///< Of `color`.
 };
 
-/// The pixel's value of a plane of the picture.
-template <class Value>
-auto plane(std::vector<Value> SurfacePicture::*values) {
-  return [values](const SurfacePixel& pixel) -> Value { return (pixel.picture.*values)[pixel.index]; };
+/// A mean over the pixel's samples.
+template <int size>
+auto mean(PixelMean<size> PixelState::*member) {
+  return [member](const SurfacePixel& pixel) { return (pixel.state.*member).get(); };
 }
 
 /// Red, green and blue of a film's layer.
@@ -45,63 +46,58 @@ ChannelTable<SurfacePixel> first_surface_channels() {
        [](Pixel pixel) { return pixel.alpha; }},
       {{"Z"},
        "Distance along the view, world units; 1e10 where nothing is seen.",
-       [](Pixel pixel) {
-         return pixel.picture.alpha[pixel.index] > 0 ? pixel.picture.depth[pixel.index] : nothing_depth;
-       }},
-      {{"normal.X", "normal.Y", "normal.Z"}, "In world space, towards the viewer.", plane(&SurfacePicture::normal)},
-      {{"albedo.R", "albedo.G", "albedo.B"},
-       "The surface's own colour, without light.",
-       plane(&SurfacePicture::albedo)},
+       [](Pixel pixel) { return pixel.picture.alpha(pixel.index) > 0 ? pixel.state.depth.value[0] : nothing_depth; }},
+      {{"normal.X", "normal.Y", "normal.Z"}, "In world space, towards the viewer.", mean(&PixelState::normal)},
+      {{"albedo.R", "albedo.G", "albedo.B"}, "The surface's own colour, without light.", mean(&PixelState::albedo)},
       {{"path"},
        "The number of the path nearest to the pixel's centre; −1: none. Paths that meet the volume are numbered from 0 "
        "in the order of their seeds.",
-       plane(&SurfacePicture::path)},
-      {{"force"}, "‖T V‖ of the path, in the unit of T.", plane(&SurfacePicture::force)},
-      {{"length"}, "The length from the beginning of the path, world units.", plane(&SurfacePicture::arc_length)},
-      {{"samples"}, "The number of samples that the pixel has taken.", plane(&SurfacePicture::samples)},
-      {{"variance"}, "Of the pixel's luminance: the square of its standard error.", plane(&SurfacePicture::variance)}};
+       [](Pixel pixel) { return pixel.state.path; }},
+      {{"force"}, "‖T V‖ of the path, in the unit of T.", mean(&PixelState::force)},
+      {{"length"}, "The length from the beginning of the path, world units.", mean(&PixelState::arc_length)},
+      {{"samples"}, "The number of samples that the pixel has taken.", [](Pixel pixel) { return pixel.state.samples; }},
+      {{"variance"}, "Of the pixel's luminance: the square of its standard error.", [](Pixel pixel) {
+         return pixel.state.variance();
+       }}};
 }
 
 /// @param bends, has_landed  Whether the camera's light bends, and whether light was traced to surfaces beforehand.
 ChannelTable<SurfacePixel> bent_light_channels(bool bends, bool has_landed) {
   using Pixel = const SurfacePixel&;
-  return {{{"gain"},
-           "The mean factor on radiance; 1 where the camera's light is straight.",
-           plane(&SurfacePicture::radiance_scale),
-           bends},
-          {{"deflection"},
-           "The mean angle by which the camera's light is turned, radians.",
-           plane(&SurfacePicture::deflection),
-           bends},
-          {{"arrives"},
-           "The part of the bent rays that could be traced to their ends.",
-           plane(&SurfacePicture::arrives),
-           bends},
-          {{"folds"},
-           "The number of sheets of a light that lie on each other where it has landed.",
-           plane(&SurfacePicture::folds),
-           bends},
-          {{"texture.s", "texture.t"},
-           "The place in a plate's texture: (0, 0) is its lower left, (1, 1) its upper right corner.",
-           plane(&SurfacePicture::texture),
-           bends},
-          {{"caustic.R", "caustic.G", "caustic.B"},
-           "If the field throws light on objects: all light that they have received from directional lights and points "
-           "through the volume.",
-           [](Pixel pixel) { return layer_color(pixel.picture.landed, 0, pixel.index); },
-           has_landed},
-          {{"straight.R", "straight.G", "straight.B"},
-           "The picture without `caustic`.",
-           [](Pixel pixel) -> Eigen::Vector3f {
-             return pixel.radiance - layer_color(pixel.picture.landed, 0, pixel.index);
-           },
-           has_landed}};
+  return {
+      {{"gain"},
+       "The mean factor on radiance; 1 where the camera's light is straight.",
+       mean(&PixelState::radiance_scale),
+       bends},
+      {{"deflection"},
+       "The mean angle by which the camera's light is turned, radians.",
+       mean(&PixelState::deflection),
+       bends},
+      {{"arrives"}, "The part of the bent rays that could be traced to their ends.", mean(&PixelState::arrives), bends},
+      {{"folds"},
+       "The number of sheets of a light that lie on each other where it has landed.",
+       mean(&PixelState::folds),
+       bends},
+      {{"texture.s", "texture.t"},
+       "The place in a plate's texture: (0, 0) is its lower left, (1, 1) its upper right corner.",
+       mean(&PixelState::texture),
+       bends},
+      {{"caustic.R", "caustic.G", "caustic.B"},
+       "If the field throws light on objects: all light that they have received from directional lights and points "
+       "through the volume.",
+       [](Pixel pixel) { return layer_color(pixel.picture.landed, 0, pixel.index); },
+       has_landed},
+      {{"straight.R", "straight.G", "straight.B"},
+       "The picture without `caustic`.",
+       [](Pixel pixel) -> Eigen::Vector3f {
+         return pixel.radiance - layer_color(pixel.picture.landed, 0, pixel.index);
+       },
+       has_landed}};
 }
 
 ChannelTable<SurfacePixel> surface_channels(const SurfacePicture& picture, const std::vector<std::string>& groups) {
   ChannelTable<SurfacePixel> table = first_surface_channels();
-  for (auto& row : bent_light_channels(!picture.radiance_scale.empty(), !picture.landed.values.empty()))
-    table.push_back(std::move(row));
+  for (auto& row : bent_light_channels(picture.bends, !picture.landed.values.empty())) table.push_back(std::move(row));
   for (std::size_t i = 0; i < groups.size(); ++i)
     table.push_back({{groups[i] + ".R", groups[i] + ".G", groups[i] + ".B"},
                      "The part of the picture that the `lights` of a `group` of this name light.",
@@ -159,10 +155,11 @@ Image make_image(const SurfacePicture& picture, const ShownLight& light, const P
   const bool is_colored = description.background == Background::color;
   Eigen::Vector3f background = Eigen::Vector3f::Zero();
   if (is_colored) background = Eigen::Vector3d(light.rec709_to_working * description.background_color).cast<float>();
-  for (std::size_t i = 0; i < picture.alpha.size(); ++i) {
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i) {
     const Eigen::Vector3f radiance(&colors.pixels[3 * i]);
-    const float alpha = picture.alpha[i];
-    const SurfacePixel pixel{picture, i, radiance, radiance + (1 - alpha) * background, is_colored ? 1 : alpha};
+    const float alpha = picture.alpha(i);
+    const SurfacePixel pixel{
+        picture, picture.pixels[i], i, radiance, radiance + (1 - alpha) * background, is_colored ? 1 : alpha};
     write_channels(table, pixel, &image.pixels[i * image.channels.size()]);
   }
   return image;

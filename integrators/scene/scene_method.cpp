@@ -242,8 +242,8 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   const PathTracerSettings settings = object_tracer_settings(scene, loaded_, camera, result.statistics.seconds_tracing);
   const SurfacePicture picture = render_surfaces(shaded, camera, settings, callbacks);
   add_picture(scene, groups, picture, result);
-  for (const float count : picture.samples)
-    result.statistics.scene_method->samples += static_cast<std::uint64_t>(count);
+  for (const PixelState& pixel : picture.pixels)
+    result.statistics.scene_method->samples += static_cast<std::uint64_t>(pixel.samples);
   report(region, loaded_, result);
   result.statistics.seconds_drawing = seconds_since(start);
   return result;

@@ -21,8 +21,6 @@ namespace tensorray {
 namespace {
 
 using Eigen::Vector2d;
-using Eigen::Vector2f;
-using Eigen::Vector3f;
 
 constexpr int tile_size = 16;    ///< Pixels.
 constexpr int neighborhood = 2;  ///< Pixels in each direction that help decide whether a pixel is done.
@@ -43,12 +41,6 @@ void require_valid(const Camera& camera, const PathTracerSettings& settings) {
   require(settings.max_seconds >= 0, "max_seconds must be >= 0");
   require(settings.first_samples >= 1 && settings.first_samples <= settings.min_samples,
           "first_samples must be 1 to min_samples");
-}
-
-/// Adds one value to a mean; `count` includes it.
-template <class Mean, class Value>
-void extend_mean(Mean&& mean, int count, const Value& value) {
-  mean += (value - mean) / static_cast<float>(count);
 }
 
 /// Sets the means of a pixel's bands after `samples` more of `count` samples.
@@ -312,9 +304,9 @@ void Rendering::add_sample(PixelState& pixel, std::size_t number, Batch& batch) 
   batch.sum.col(0) += shader.radiance(number);
   for (int layer = 0; layer < scene_.layers(); ++layer) batch.sum.col(1 + layer) += shader.layer(number, layer);
   if (view.bent) {
-    extend_mean(pixel.radiance_scale, ++pixel.bent, static_cast<float>(view.bent->radiance_scale));
-    extend_mean(pixel.deflection, pixel.bent, static_cast<float>(view.bent->deflection));
-    extend_mean(pixel.arrives, pixel.bent, static_cast<float>(view.bent->arrives));
+    pixel.radiance_scale.add(view.bent->radiance_scale);
+    pixel.deflection.add(view.bent->deflection);
+    pixel.arrives.add(view.bent->arrives);
   }
   ++pixel.samples;
   const double luminance = scene_.colors.luminance(shader.radiance(number)), change = luminance - pixel.luminance;
@@ -335,14 +327,12 @@ void Rendering::add_light(Tile& tile, int x, int y, int samples, Batch& batch) c
 }
 
 void Rendering::add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface) const {
-  const double depth = (surface.hit.position - camera_.position).dot(camera_.forward);
-  ++pixel.hits;
-  extend_mean(pixel.depth, pixel.hits, static_cast<float>(depth));
-  extend_mean(Eigen::Map<Vector3f>(pixel.normal), pixel.hits, Vector3f(surface.normal.cast<float>()));
-  extend_mean(Eigen::Map<Vector3f>(pixel.albedo), pixel.hits, surface.albedo);
+  pixel.depth.add((surface.hit.position - camera_.position).dot(camera_.forward));
+  pixel.normal.add(surface.normal);
+  pixel.albedo.add(surface.albedo);
   const SurfaceData data = scene_.surfaces.data(surface.hit);
-  if (data.force) extend_mean(pixel.force, ++pixel.force_hits, *data.force);
-  if (data.arc_length) extend_mean(pixel.arc_length, ++pixel.length_hits, *data.arc_length);
+  if (data.force) pixel.force.add(*data.force);
+  if (data.arc_length) pixel.arc_length.add(*data.arc_length);
   if (data.path && offset.squaredNorm() < pixel.nearest) {
     pixel.nearest = offset.squaredNorm();
     pixel.path = static_cast<float>(*data.path);
@@ -356,8 +346,7 @@ void Rendering::add_place(PixelState& pixel, const FirstSurface& surface) const 
   if (const auto& texture = scene_.surfaces.surfaces()[hit.surface].texture) {
     const Vector2d place =
         texture->plate.to_pixel(hit.position).cwiseQuotient(texture->plate.resolution.cast<double>());
-    extend_mean(Eigen::Map<Vector2f>(pixel.texture), ++pixel.texture_hits,
-                Vector2f(Vector2d(place.x(), 1 - place.y()).cast<float>()));
+    pixel.texture.add(Vector2d(place.x(), 1 - place.y()));
   }
   float folds = 0;
   bool is_landed = false;
@@ -366,7 +355,7 @@ void Rendering::add_place(PixelState& pixel, const FirstSurface& surface) const 
     folds += folds_at(light, hit.position);
     is_landed = true;
   }
-  if (is_landed) extend_mean(pixel.folds, ++pixel.folds_hits, folds);
+  if (is_landed) pixel.folds.add(folds);
 }
 
 /// Marks the pixels that are done. Pixels of other tiles do not matter.
@@ -402,8 +391,8 @@ bool Rendering::is_precise(Tile& tile, int x, int y) const {
 
 /// The picture of the tiles as they are kept.
 SurfacePicture Rendering::picture() const {
-  SurfacePicture picture = empty_picture(width_, height_, scene_);
-  for (std::size_t number = 0; number < tiles_; ++number) add_tile(load(number), settings_.transparent, picture);
+  SurfacePicture picture = empty_picture(width_, height_, settings_.transparent, scene_);
+  for (std::size_t number = 0; number < tiles_; ++number) add_tile(load(number), picture);
   return picture;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -40,28 +41,67 @@ struct PathTracerSettings {
   std::uint64_t seed = 0;
 };
 
-/// Planes of width × height pixels, row by row from the top; all values are finite. Values are means over the samples
-/// of a pixel. The pixel filter distributes the samples, so the planes are antialiased like the light.
+/// A mean over the samples of a pixel that have a value.
+template <int size>
+struct PixelMean {
+  float value[size] = {};  ///< As long as no sample has one, it stays as it is.
+  int count = 0;
+
+  template <class Value>
+  void add(const Value& sample) {
+    ++count;
+    for (int i = 0; i < size; ++i) {
+      if constexpr (size == 1)
+        value[i] += (static_cast<float>(sample) - value[i]) / static_cast<float>(count);
+      else
+        value[i] += (static_cast<float>(sample[i]) - value[i]) / static_cast<float>(count);
+    }
+  }
+  Eigen::Matrix<float, size, 1> get() const { return Eigen::Map<const Eigen::Matrix<float, size, 1>>(value); }
+};
+
+/// What is known of a pixel, beside its light; all values are finite. The pixel filter distributes the samples, so the
+/// means are antialiased like the light. What a channel of an EXR shows is a member here, which `add_sample` or
+/// `add_surface` (path_tracer.cpp) fill, and a row of `surface_channels` (integrators/path_tracing/stage.cpp).
+/// It has no pointers and no gaps: checkpoints keep its bytes.
+struct PixelState {
+  double luminance = 0, squares = 0;  ///< Mean, and the sum of squared differences from it (Welford 1962).
+  double nearest = std::numeric_limits<double>::infinity();  ///< Squared distance from the centre to the path hit.
+  int samples = 0;
+  int done = 0;     ///< 1: it gets no more samples.
+  float path = -1;  ///< Number of the path that was hit nearest to the pixel's centre; −1: none.
+
+  // Of the samples that hit something, at the first surface.
+  PixelMean<1> depth;   ///< Along the camera's `forward`, world units.
+  PixelMean<3> normal;  ///< World, towards the viewer, as shaded; a mean, so its length may be below 1.
+  PixelMean<3> albedo;  ///< Working space: the reflectance; for metals, times Fresnel's reflectance.
+  // Of those that hit a surface with this attribute.
+  PixelMean<1> force, arc_length;
+
+  // If light bends. See BentView, of the samples that enter the region; 1, 0 and 1 where none does.
+  PixelMean<1> radiance_scale{{1}}, deflection, arrives{{1}};
+  PixelMean<2> texture;  ///< Place in the texture of a plate: 0, 0 is its lower left, 1, 1 its upper right corner.
+  PixelMean<1> folds;    ///< Sheets of landed light, of a plate on which it has landed.
+
+  /// Squared standard error of the pixel's luminance if samples were independent.
+  float variance() const {
+    const double count = samples;
+    return samples > 1 ? static_cast<float>(squares / (count * (count - 1))) : 0.0f;
+  }
+};
+static_assert(sizeof(PixelState) == 136 && std::is_trivially_copyable_v<PixelState>);
+
+/// Light and pixels, row by row from the top. Light is the mean over the samples of a pixel.
 struct SurfacePicture {
-  Film radiance;             ///< One channel for each band; multiplied by alpha if the picture is transparent.
-  std::vector<float> alpha;  ///< 1 everywhere if the picture is not transparent.
-  /// Means over the samples that hit something, at the first surface; 0 where no sample did.
-  std::vector<float> depth;             ///< Along the camera's `forward`, world units.
-  std::vector<Eigen::Vector3f> normal;  ///< World, towards the viewer, as shaded; a mean, so its length may be below 1.
-  std::vector<Eigen::Vector3f> albedo;  ///< Working space: the reflectance; for metals, times Fresnel's reflectance.
-  /// Means over the samples that hit a surface with this attribute; 0 where no sample did.
-  std::vector<float> force, arc_length;
-  Film landed;  ///< The part of `radiance` that ShadedScene::irradiance_maps has lit, in the working space; empty if
-                ///< none has.
-  Film groups;  ///< The part of each group of lights: red, green, blue of the first, then of the next. May be empty.
-  /// If light bends: means over the samples that enter the region; 1, 0 and 1 where none does. Otherwise empty.
-  std::vector<float> radiance_scale, deflection, arrives;  ///< See BentView.
-  /// If light bends: means over the samples that hit a plate with a texture, or one on which light has landed.
-  std::vector<Eigen::Vector2f> texture;  ///< Place in its texture: 0, 0 is its lower left, 1, 1 its upper right corner.
-  std::vector<float> folds;              ///< Sheets of landed light.
-  std::vector<float> path;               ///< Number of the path that was hit nearest to the pixel's centre; −1: none.
-  std::vector<float> samples;            ///< Number of samples.
-  std::vector<float> variance;  ///< Squared standard error of the pixel's luminance if samples were independent.
+  Film radiance;  ///< One channel for each band; multiplied by alpha if the picture is transparent.
+  Film landed;    ///< The part of `radiance` that ShadedScene::irradiance_maps has lit, in the working space; empty if
+                  ///< none has.
+  Film groups;    ///< The part of each group of lights: red, green, blue of the first, then of the next. May be empty.
+  std::vector<PixelState> pixels;
+  bool transparent = false, bends = false;  ///< As PathTracerSettings::transparent; whether the scene has a region.
+
+  /// 1 everywhere where there are samples, if the picture is not transparent.
+  float alpha(std::size_t pixel) const;
 };
 
 /// Functions that are called during a render.

@@ -4,8 +4,6 @@
 
 namespace tensorray {
 
-using Eigen::Vector3f;
-
 Tile::Tile(int left_, int top_, int width_, int height_, std::size_t light_values_)
     : left(left_),
       top(top_),
@@ -29,54 +27,32 @@ void Tile::copy(Archive& archive) {
   is_done = done != 0;
 }
 
-SurfacePicture empty_picture(int width, int height, const ShadedScene& scene) {
+SurfacePicture empty_picture(int width, int height, bool transparent, const ShadedScene& scene) {
   SurfacePicture picture;
   picture.radiance = Film(width, height, static_cast<int>(scene.colors.bands()));
   if (scene.has_traced_light()) picture.landed = Film(width, height, 3);
   if (scene.groups > 0) picture.groups = Film(width, height, 3 * scene.groups);
-  const std::size_t size = picture.radiance.plane_size();
-  if (scene.region) {
-    picture.radiance_scale.assign(size, 1);
-    picture.arrives.assign(size, 1);
-    picture.deflection.assign(size, 0);
-    picture.folds.assign(size, 0);
-    picture.texture.assign(size, Eigen::Vector2f::Zero());
-  }
-  for (auto* plane :
-       {&picture.alpha, &picture.depth, &picture.force, &picture.arc_length, &picture.samples, &picture.variance})
-    plane->assign(size, 0);
-  picture.path.assign(size, -1);
-  picture.normal.assign(size, Vector3f::Zero());
-  picture.albedo.assign(size, Vector3f::Zero());
+  picture.pixels.resize(picture.radiance.plane_size());
+  picture.transparent = transparent;
+  picture.bends = scene.region != nullptr;
   return picture;
 }
 
-void add_tile(const Tile& tile, bool transparent, SurfacePicture& picture) {
+void add_tile(const Tile& tile, SurfacePicture& picture) {
   for (std::size_t i = 0; i < tile.pixels.size(); ++i) {
-    const PixelState& pixel = tile.pixels[i];
     const int x = tile.left + static_cast<int>(i) % tile.width, y = tile.top + static_cast<int>(i) / tile.width;
     const std::size_t index = static_cast<std::size_t>(y) * picture.radiance.width + x;
     const double* light = &tile.light[i * tile.light_values];
     for (Film* film : {&picture.radiance, &picture.landed, &picture.groups})
       for (int channel = 0; channel < film->channels; ++channel) film->plane(channel)[index] = *light++;
-    const bool is_opaque = !transparent && pixel.samples > 0;
-    picture.alpha[index] = is_opaque ? 1.0f : static_cast<float>(pixel.hits / std::max(1.0, 1.0 * pixel.samples));
-    picture.depth[index] = pixel.depth;
-    picture.normal[index] = Eigen::Map<const Vector3f>(pixel.normal);
-    picture.albedo[index] = Eigen::Map<const Vector3f>(pixel.albedo);
-    picture.force[index] = pixel.force;
-    picture.arc_length[index] = pixel.arc_length;
-    if (!picture.radiance_scale.empty()) {
-      picture.radiance_scale[index] = pixel.radiance_scale;
-      picture.deflection[index] = pixel.deflection;
-      picture.arrives[index] = pixel.arrives;
-      picture.folds[index] = pixel.folds;
-      picture.texture[index] = Eigen::Map<const Eigen::Vector2f>(pixel.texture);
-    }
-    picture.path[index] = pixel.path;
-    picture.samples[index] = static_cast<float>(pixel.samples);
-    picture.variance[index] = pixel.variance();
+    picture.pixels[index] = tile.pixels[i];
   }
+}
+
+float SurfacePicture::alpha(std::size_t pixel) const {
+  const PixelState& state = pixels[pixel];
+  if (!transparent && state.samples > 0) return 1;
+  return static_cast<float>(state.depth.count / std::max(1.0, 1.0 * state.samples));
 }
 
 }  // namespace tensorray

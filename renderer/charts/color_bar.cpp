@@ -122,8 +122,7 @@ Panel lay_panel(Image& image, const Layout& layout, const Eigen::Vector2d& size,
 }
 
 void check(const Image& image) {
-  const std::vector<std::string>& channels = image.channels;
-  if (channels.size() < 3 || channels[0] != "R" || channels[1] != "G" || channels[2] != "B")
+  if (!begins_with_rgb(image))
     throw std::invalid_argument("a legend needs a picture that begins with channels R, G, B");
 }
 

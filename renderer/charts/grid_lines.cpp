@@ -40,8 +40,7 @@ double coverage(const PixelCoordinates& seen, const GridLines& lines, const Eige
 }
 
 void check(const Image& image, const std::vector<PixelCoordinates>& coordinates, const GridLines& lines) {
-  const std::vector<std::string>& channels = image.channels;
-  if (channels.size() < 3 || channels[0] != "R" || channels[1] != "G" || channels[2] != "B")
+  if (!begins_with_rgb(image))
     throw std::invalid_argument("grid lines need a picture that begins with channels R, G, B");
   if (coordinates.size() != static_cast<std::size_t>(image.width) * image.height)
     throw std::invalid_argument("grid lines need as many coordinates as the picture has pixels");

@@ -225,26 +225,17 @@ double distance(const Glyph& glyph, const Eigen::Vector2d& point) {
   return nearest;
 }
 
-/// The range from floor(low) to ceil(high), limited to [0, size]. Clamps before converting: huge values do not fit into
-/// an int.
-Eigen::Vector2i pixel_range(double low, double high, int size) {
-  return {static_cast<int>(std::floor(std::clamp(low, 0.0, static_cast<double>(size)))),
-          static_cast<int>(std::ceil(std::clamp(high, 0.0, static_cast<double>(size))))};
-}
-
 /// @param origin  Position of (0, 0) of the grid. @param unit  Size of a grid unit, in pixels.
 /// @param width   Of strokes, in pixels.
 void draw_glyph(Image& image, const Glyph& glyph, const Eigen::Vector2d& origin, double unit, double width,
                 const Eigen::Vector3d& color) {
-  const double margin = width / 2 + 1;
-  const Eigen::Vector2i xs = pixel_range(origin.x() - margin, origin.x() + glyph.width * unit + margin, image.width);
-  const Eigen::Vector2i ys =
-      pixel_range(origin.y() - highest * unit - margin, origin.y() - lowest * unit + margin, image.height);
-  for (int y = ys[0]; y < ys[1]; ++y)
-    for (int x = xs[0]; x < xs[1]; ++x) {
-      const Eigen::Vector2d point((x + 0.5 - origin.x()) / unit, (origin.y() - y - 0.5) / unit);
-      lay_over(image, x, y, color, line_coverage(distance(glyph, point) * unit, width));
-    }
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(width / 2 + 1);
+  const Eigen::Vector2d upper(origin - Eigen::Vector2d(0, highest * unit)),
+      lower(origin + Eigen::Vector2d(glyph.width, -lowest) * unit);
+  for_each_pixel(image, {upper - margin, lower + margin}, [&](int x, int y, double) {
+    const Eigen::Vector2d point((x + 0.5 - origin.x()) / unit, (origin.y() - y - 0.5) / unit);
+    lay_over(image, x, y, color, line_coverage(distance(glyph, point) * unit, width));
+  });
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "renderer/color/builtin_config.h"
+#include "renderer/color/color.h"
 
 namespace tensorray {
 

@@ -14,7 +14,6 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
-#include "renderer/color/builtin_config.h"
 #include "renderer/color/chromaticities.h"
 #include "renderer/color/file_colors.h"
 #include "renderer/color/icc_profile.h"
@@ -277,10 +276,9 @@ Matrix3d ColorManagement::xyz_to_working_adapted(const Vector3d& white) const {
 }
 
 void ColorManagement::to_display(Image& image) const {
-  const std::vector<std::string>& channels = image.channels;
-  if (channels.size() < 3 || channels[0] != "R" || channels[1] != "G" || channels[2] != "B")
+  if (!begins_with_rgb(image))
     throw std::invalid_argument("a picture for a display must begin with the channels R, G, B");
-  const std::ptrdiff_t pixel_bytes = static_cast<std::ptrdiff_t>(channels.size() * sizeof(float));
+  const std::ptrdiff_t pixel_bytes = static_cast<std::ptrdiff_t>(image.channels.size() * sizeof(float));
   tbb::parallel_for(0, image.height, [&](int y) {
     OCIO::PackedImageDesc row(image.pixel(0, y), image.width, 1, 3, OCIO::BIT_DEPTH_F32, sizeof(float), pixel_bytes,
                               pixel_bytes * image.width);

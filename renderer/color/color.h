@@ -19,7 +19,9 @@ namespace tensorray {
 /// The matrix from linear Rec.709 (ITU-R BT.709, white D65) to XYZ. White has Y = 1.
 Eigen::Matrix3d rec709_to_xyz();
 
-/// The name of the config that is part of the program.
+/// The config that is part of the program, as text, and its name. It refers to no other file and needs no OpenColorIO
+/// newer than 2.1.
+extern const char* const builtin_color_config;
 extern const char* const builtin_config_word;
 
 /// The view of the built-in config that shows light x as 1 - exp(-x) of white.

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "renderer/color/color.h"
-#include "renderer/images/color_tags.h"
+#include "renderer/images/image.h"
 
 namespace tensorray {
 

@@ -95,14 +95,6 @@ double AreaDeposit::triangle(const Vector2d& a, const Vector2d& b, const Vector2
   return 0;
 }
 
-void AreaDeposit::add_triangle(const Vector2d& a, const Vector2d& b, const Vector2d& c, double power) {
-  const double density = triangle(a, b, c, power);
-  if (density == 0) return;
-  add_edge(a, b, density);
-  add_edge(b, c, density);
-  add_edge(c, a, density);
-}
-
 void AreaDeposit::add_point(const Vector2d& at, double power) {
   if (!is_on_plate(at, {width_, height_})) return;
   const int x = std::min(static_cast<int>(at.x()), width_ - 1), y = std::min(static_cast<int>(at.y()), height_ - 1);
@@ -111,13 +103,20 @@ void AreaDeposit::add_point(const Vector2d& at, double power) {
   add_difference(x + 1, y, 0, unit * power);
 }
 
+/// Left of the plate an edge counts as if it were on the border; right of it, it covers nothing.
 void AreaDeposit::add_edge(const Vector2d& from, const Vector2d& to, double density) {
-  const auto is_between = [&](double x) { return x >= 0 && x <= width_; };
-  if (!is_between(from.x()) || !is_between(to.x())) return add_edge_now(from, to, density);
+  for (const double border : {0.0, static_cast<double>(width_)}) {
+    if ((from.x() < border) == (to.x() < border) || from.x() == border || to.x() == border) continue;
+    const double part = (border - from.x()) / (to.x() - from.x());
+    const Vector2d middle(border, from.y() + part * (to.y() - from.y()));
+    add_edge(from, middle, density);
+    return add_edge(middle, to, density);
+  }
+  if (from.x() >= width_ && to.x() >= width_) return;
   if (batch_.count == EdgeBatch::capacity) flush();
-  batch_.from_x[batch_.count] = from.x();
+  batch_.from_x[batch_.count] = std::max(from.x(), 0.0);
   batch_.from_y[batch_.count] = from.y();
-  batch_.to_x[batch_.count] = to.x();
+  batch_.to_x[batch_.count] = std::max(to.x(), 0.0);
   batch_.to_y[batch_.count] = to.y();
   batch_.density[batch_.count++] = density;
 }
@@ -139,50 +138,6 @@ void AreaDeposit::read_row(const std::vector<const AreaDeposit*>& deposits, int 
     for (const AreaDeposit* deposit : deposits)
       sum += deposit->sums_[any.place(x, y) + static_cast<std::size_t>(plane)];
     power[x] = static_cast<double>(static_cast<std::int64_t>(sum)) / unit;
-  }
-}
-
-void AreaDeposit::add_edge_now(const Vector2d& from, const Vector2d& to, double density) {
-  if (from.y() == to.y()) return;
-  if (from.y() > to.y()) return add_edge_now(to, from, -density);
-  const double slope = (to.x() - from.x()) / (to.y() - from.y()), end = std::min<double>(to.y(), end_row_);
-  double y = std::max<double>(from.y(), first_row_);
-  if (!(y < end)) return;
-  for (int line = static_cast<int>(y); y < end; ++line) {
-    const double next = std::min(line + 1.0, end);
-    const double x = from.x() + (y - from.y()) * slope, next_x = from.x() + (next - from.y()) * slope;
-    add_span(line, std::min(x, next_x), std::max(x, next_x), density * (next - y));
-    y = next;
-  }
-}
-
-/// Adds a part of an edge within a row. The part goes from column `left` to `right`; `weight` is the density times its
-/// height. Left of the plate it counts as if it were on the border; right of it, it covers nothing.
-void AreaDeposit::add_span(int y, double left, double right, double weight) {
-  if (left >= 0 && right <= width_) return add_inner_span(y, left, right, weight);
-  if (left >= width_) return;
-  if (right <= 0) return add_difference(0, y, weight, 0);
-  const double per_column = weight / (right - left);
-  if (left < 0) {
-    add_difference(0, y, -left * per_column, 0);
-    left = 0;
-  }
-  right = std::min<double>(right, width_);
-  add_inner_span(y, left, right, (right - left) * per_column);
-}
-
-/// The area to the left of column x that the edge covers is a parabola up to the edge's right end, then a line.
-void AreaDeposit::add_inner_span(int y, double left, double right, double weight) {
-  const double middle = (left + right) * 0.5, curvature = weight / (2 * (right - left));
-  double area = 0, before = 0;
-  for (int x = static_cast<int>(left);; ++x) {
-    const double inside = x + 1 - left;
-    const bool is_last = x + 1 >= right;
-    const double next = is_last ? weight * (x + 1 - middle) : curvature * inside * inside, covered = next - area;
-    add_difference(x, y, covered, before);
-    if (is_last) return add_difference(x + 1, y, weight, covered);
-    area = next;
-    before = covered;
   }
 }
 

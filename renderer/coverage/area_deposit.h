@@ -46,9 +46,6 @@ class AreaDeposit {
   ///                 other sense.
   void add_edge(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double density);
 
-  /// Adds a triangle that has no neighbours.
-  void add_triangle(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c, double power);
-
   /// Adds `power` to the pixel that contains `at`, if there is one. A point on the right or lower edge counts as
   /// inside.
   void add_point(const Eigen::Vector2d& at, double power);
@@ -68,9 +65,6 @@ class AreaDeposit {
   static void read_row(const std::vector<const AreaDeposit*>& deposits, int y, int plane, double* power);
 
  private:
-  void add_edge_now(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double density);
-  void add_span(int y, double left, double right, double weight);
-  void add_inner_span(int y, double left, double right, double weight);
   void add_difference(int x, int y, double covered, double before);
 
   std::size_t place(int x, int y) const {

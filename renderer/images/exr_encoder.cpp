@@ -1,5 +1,3 @@
-#include "renderer/images/exr_encoder.h"
-
 #include <algorithm>
 #include <cstdint>
 #include <exception>
@@ -21,6 +19,7 @@
 #include <OpenEXR/ImfThreading.h>
 
 #include "base/text/text.h"
+#include "renderer/images/formats.h"
 
 namespace tensorray {
 namespace {

@@ -17,11 +17,7 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
-#include "renderer/images/exr_encoder.h"
-#include "renderer/images/image_plugin.h"
-#include "renderer/images/luminance_chroma.h"
-#include "renderer/images/png_chunks.h"
-#include "renderer/images/png_encoder.h"
+#include "renderer/images/formats.h"
 
 namespace tensorray {
 namespace {

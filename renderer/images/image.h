@@ -8,11 +8,10 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
-
-#include "renderer/images/color_tags.h"
 
 namespace tensorray {
 
@@ -35,6 +34,11 @@ struct Image {
     return &pixels[(static_cast<std::size_t>(y) * width + x) * channels.size()];
   }
 };
+
+inline bool begins_with_rgb(const Image& image) {
+  const std::vector<std::string>& names = image.channels;
+  return names.size() >= 3 && names[0] == "R" && names[1] == "G" && names[2] == "B";
+}
 
 /// Whether files with the ending of `path` can store alpha. The colours are then not multiplied by it (in EXR they
 /// are).
@@ -72,6 +76,16 @@ void write_image(const std::filesystem::path& path, const Image& image, const Im
 /// not multiplied by alpha. If a file has several pictures, reads the first.
 /// @throw std::runtime_error naming the file and the reason; also if the file is cut off.
 Image read_image(const std::filesystem::path& path);
+
+/// What a picture file says about its colours, as it says it; renderer/color/file_colors.h says what it means.
+struct ColorTags {
+  std::string icc_profile;                               ///< The embedded ICC profile; empty: none.
+  std::optional<std::array<double, 8>> chromaticities;   ///< x and y of red, green, blue and white.
+  std::optional<std::array<double, 2>> adopted_neutral;  ///< EXR: x and y of what counts as white.
+  std::optional<double> gamma;                           ///< PNG (gAMA): stored values are light to this power.
+  std::optional<std::array<int, 2>> code_points;         ///< PNG (cICP): primaries and curve of ITU-T H.273.
+  bool is_srgb = false;                                  ///< PNG (sRGB).
+};
 
 /// How a picture's values are stored.
 enum class SampleType { uint8, uint16, float32 };

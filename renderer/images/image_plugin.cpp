@@ -1,9 +1,9 @@
-#include "renderer/images/image_plugin.h"
-
 #include <stdexcept>
 #include <string>
 
 #include <dlfcn.h>
+
+#include "renderer/images/formats.h"
 
 namespace tensorray {
 namespace {

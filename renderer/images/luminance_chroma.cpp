@@ -1,5 +1,3 @@
-#include "renderer/images/luminance_chroma.h"
-
 #include <algorithm>
 #include <cstddef>
 #include <memory>
@@ -12,7 +10,7 @@
 #include <OpenEXR/ImfTestFile.h>
 
 #include "base/text/text.h"
-#include "renderer/images/stored_bytes.h"
+#include "renderer/images/formats.h"
 
 namespace tensorray {
 namespace {

@@ -1,5 +1,3 @@
-#include "renderer/images/png_chunks.h"
-
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -11,6 +9,7 @@
 
 #include "base/text/byte_order.h"
 #include "base/text/text.h"
+#include "renderer/images/formats.h"
 
 namespace tensorray {
 namespace {

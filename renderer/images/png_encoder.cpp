@@ -1,5 +1,3 @@
-#include "renderer/images/png_encoder.h"
-
 #include <algorithm>
 #include <csetjmp>
 #include <cstdint>
@@ -8,6 +6,8 @@
 
 #include <png.h>
 #include <zlib.h>
+
+#include "renderer/images/formats.h"
 
 namespace tensorray {
 namespace {

@@ -143,12 +143,10 @@ void PhotonTracer::trace(const Source& source, PathSampler sampler, ChunkPhotons
   }
   const auto hit = surfaces_.intersect(photon.origin, photon.direction);
   const double entry = region_.entry(photon.origin, photon.direction);
-  if (!(entry < (hit ? hit->distance : std::numeric_limits<double>::infinity()))) {
-    result.counts[static_cast<std::size_t>(hit ? PhotonEnd::before : PhotonEnd::escaped)] += rays.size();
-    return;
-  }
-  if (!(photon.power > 0)) {  // From the side of an area light that does not emit.
-    result.counts[static_cast<std::size_t>(PhotonEnd::escaped)] += rays.size();
+  const bool enters = entry < (hit ? hit->distance : std::numeric_limits<double>::infinity());
+  if (!enters || !(photon.power > 0)) {  // Without power it is from the side of an area light that does not emit.
+    const PhotonEnd end = hit && !enters ? PhotonEnd::before : PhotonEnd::escaped;
+    result.counts[static_cast<std::size_t>(end)] += rays.size();
     return;
   }
   region_.trace_importance(rays);

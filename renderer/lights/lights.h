@@ -3,6 +3,9 @@
 /// The lights of a scene, and how to sample directions towards them. Radiance is given for each band, relative to the
 /// light that the bands are made from: see Band.
 
+#include <algorithm>
+#include <cstddef>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <variant>
@@ -11,11 +14,19 @@
 #include <Eigen/Geometry>
 
 #include "base/geometry/triangle_mesh.h"
-#include "renderer/spectra/band_range.h"
 #include "renderer/surfaces/triangle_scene.h"
 #include "renderer/textures/environment_map.h"
 
 namespace tensorray {
+
+/// Bands that stand next to each other, such as those whose light a path carries. By default: all.
+struct BandRange {
+  std::ptrdiff_t first = 0;
+  std::ptrdiff_t count = std::numeric_limits<std::ptrdiff_t>::max();  ///< At most.
+
+  /// How many of `bands` bands are in the range.
+  std::ptrdiff_t size(std::ptrdiff_t bands) const { return std::min(count, bands - first); }
+};
 
 /// A surface that emits evenly, equally in all directions.
 struct AreaLight {

@@ -3,64 +3,41 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 
 #include "base/constants.h"
+#include "base/overloaded.h"
 #include "renderer/sampling/sampling.h"
 
 namespace tensorray {
 namespace {
 
+using Eigen::Vector3d;
+
 Diffuse prepare(const Diffuse& settings) { return settings; }
 
-double evaluate(const Diffuse&, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d&,
-                BandsOut f) {
-  f = reflectance.head(f.size()) / pi;
-  return wi.z() / pi;
-}
-
-Eigen::Vector3d sample(const Diffuse&, const BandsIn&, const Eigen::Vector3d&, const Eigen::Vector2d& u) {
-  return square_to_cosine_hemisphere(u);
-}
-
-/// Opaque models need only two numbers, and one of them needs the view.
-template <class Model>
-Eigen::Vector3d sample(const Model& model, const ViewedMaterial& view, const BandsIn& reflectance,
-                       const Eigen::Vector3d& wo, const Eigen::Vector3d& u) {
-  const Eigen::Vector2d place = u.head<2>();
-  if constexpr (std::is_same_v<Model, PrincipledScattering>)
-    return tensorray::sample(model, view.principled, wo, place);
-  else if constexpr (std::is_same_v<Model, DielectricScattering>)
-    return tensorray::sample(model, reflectance, wo, u);
-  else
-    return sample(model, reflectance, wo, place);
+/// The model of glass; null if the material is another one.
+const DielectricScattering* glass_of(const Material& material) {
+  using Glass = const DielectricScattering*;
+  return std::visit(Overloaded{[](const DielectricScattering& glass) -> Glass { return &glass; },
+                               [](const Diffuse&) -> Glass { return nullptr; },
+                               [](const ConductorScattering&) -> Glass { return nullptr; },
+                               [](const PrincipledScattering&) -> Glass { return nullptr; }},
+                    material.scattering);
 }
 
 /// Mirrors `w` in z if the material is opaque and wo is below the surface: opaque models need wo above it.
-Eigen::Vector3d seen(const Material& material, const Eigen::Vector3d& w, const Eigen::Vector3d& wo) {
-  return wo.z() < 0 && !is_glass(material) ? Eigen::Vector3d(w.x(), w.y(), -w.z()) : w;
+Vector3d seen(const Material& material, const Vector3d& w, const Vector3d& wo) {
+  return wo.z() < 0 && !is_glass(material) ? Vector3d(w.x(), w.y(), -w.z()) : w;
 }
 
 /// False if f is 0 because of the directions alone.
-bool scatters(const Material& material, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
+bool scatters(const Material& material, const Vector3d& wi, const Vector3d& wo) {
   const double sides = wi.z() * wo.z();
   return sides > 0 || (sides < 0 && is_glass(material));
 }
 
-/// Metals alone have values of each band.
-template <class Model>
-double evaluate(const Model& model, const ViewedMaterial& view, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-                const Eigen::Vector3d& wo, BandsOut f) {
-  if constexpr (std::is_same_v<Model, ConductorScattering>)
-    return tensorray::evaluate(model, reflectance, wi, wo, f, view.first_band);
-  else if constexpr (std::is_same_v<Model, PrincipledScattering>)
-    return tensorray::evaluate(model, view.principled, reflectance, wi, wo, f);
-  else
-    return evaluate(model, reflectance, wi, wo, f);
-}
-
-double refraction(const Material& material, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
-  const auto* glass = std::get_if<DielectricScattering>(&material.scattering);
+double refraction(const Material& material, const Vector3d& wi, const Vector3d& wo) {
+  const DielectricScattering* const glass = glass_of(material);
   if (glass == nullptr || wi.z() * wo.z() > 0) return 1;
   const double index2 = glass->index * glass->index;
   return wo.z() > 0 ? 1 / index2 : index2;
@@ -68,7 +45,23 @@ double refraction(const Material& material, const Eigen::Vector3d& wi, const Eig
 
 }  // namespace
 
-bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
+bool is_glass(const Material& material) { return glass_of(material) != nullptr; }
+
+bool is_diffuse(const Material& material) {
+  return std::visit(
+      Overloaded{[](const Diffuse&) { return true; }, [](const ConductorScattering&) { return false; },
+                 [](const DielectricScattering&) { return false; }, [](const PrincipledScattering&) { return false; }},
+      material.scattering);
+}
+
+const BandValues* mean_fresnel(const Material& material) {
+  using Factor = const BandValues*;
+  return std::visit(Overloaded{[](const ConductorScattering& metal) -> Factor { return &metal.mean_fresnel; },
+                               [](const Diffuse&) -> Factor { return nullptr; },
+                               [](const DielectricScattering&) -> Factor { return nullptr; },
+                               [](const PrincipledScattering&) -> Factor { return nullptr; }},
+                    material.scattering);
+}
 
 Material make_material(const MaterialSettings& settings, const BandValues& reflectance) {
   if (!(reflectance.allFinite() && (reflectance >= 0).all() && (reflectance <= 1).all()))
@@ -84,7 +77,7 @@ Material make_material(const MaterialSettings& settings, const BandValues& refle
   return material;
 }
 
-ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
+ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Vector3d& wo,
                       Eigen::Index first_band) {
   ViewedMaterial view{wo, first_band, {}};
   if (const auto* principled = std::get_if<PrincipledScattering>(&material.scattering))
@@ -92,37 +85,45 @@ ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, cons
   return view;
 }
 
-double evaluate(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
-                const Eigen::Vector3d& wi, BandsOut f) {
-  const Eigen::Vector3d& wo = view.wo;
-  if (!scatters(material, wi, wo)) {
+double evaluate(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance, const Vector3d& wi,
+                BandsOut f) {
+  if (!scatters(material, wi, view.wo)) {
     f.setZero();
     return 0;
   }
-  const Eigen::Vector3d i = seen(material, wi, wo), o = seen(material, wo, wo);
-  const auto of = [&](const auto& model) { return evaluate(model, view, reflectance, i, o, f); };
-  return std::visit(of, material.scattering);
+  const Vector3d i = seen(material, wi, view.wo), o = seen(material, view.wo, view.wo);
+  return std::visit(
+      Overloaded{
+          [&](const Diffuse&) {
+            f = reflectance.head(f.size()) / pi;
+            return i.z() / pi;
+          },
+          [&](const ConductorScattering& metal) { return evaluate(metal, reflectance, i, o, f, view.first_band); },
+          [&](const DielectricScattering& glass) { return evaluate(glass, reflectance, i, o, f); },
+          [&](const PrincipledScattering& layers) { return evaluate(layers, view.principled, reflectance, i, o, f); }},
+      material.scattering);
 }
 
-double evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
-  return evaluate(material, viewed(material, reflectance, wo, first_band), reflectance, wi, f);
-}
-
-double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
+double pdf(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance, const Vector3d& wi) {
   BandValues none;
-  return evaluate(material, reflectance, wi, wo, none);
+  return evaluate(material, view, reflectance, wi, none);
 }
 
 std::optional<ScatteringSample> sample(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
-                                       const Eigen::Vector3d& u, BandsOut weight) {
-  const Eigen::Vector3d& wo = view.wo;
+                                       const Vector3d& u, BandsOut weight) {
+  const Vector3d& wo = view.wo;
   weight.setZero();
   if (wo.z() == 0) return std::nullopt;
-  const Eigen::Vector3d o = seen(material, wo, wo);
-  const auto direction = [&](const auto& model) { return sample(model, view, reflectance, o, u); };
+  const Vector3d o = seen(material, wo, wo);
+  const Eigen::Vector2d place = u.head<2>();
+  const Vector3d direction = std::visit(
+      Overloaded{[&](const Diffuse&) { return square_to_cosine_hemisphere(place); },
+                 [&](const ConductorScattering& metal) { return sample(metal, o, place); },
+                 [&](const DielectricScattering& glass) { return sample(glass, o, u); },
+                 [&](const PrincipledScattering& layers) { return sample(layers, view.principled, o, place); }},
+      material.scattering);
   ScatteringSample result;
-  result.wi = seen(material, std::visit(direction, material.scattering), wo);
+  result.wi = seen(material, direction, wo);
   result.pdf = evaluate(material, view, reflectance, result.wi, weight);
   if (!(result.pdf > 0)) {
     weight.setZero();
@@ -131,11 +132,6 @@ std::optional<ScatteringSample> sample(const Material& material, const ViewedMat
   weight *= std::abs(result.wi.z()) / result.pdf;
   result.refraction = refraction(material, result.wi, wo);
   return result;
-}
-
-std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                                       const Eigen::Vector3d& u, BandsOut weight, Eigen::Index first_band) {
-  return sample(material, viewed(material, reflectance, wo, first_band), reflectance, u, weight);
 }
 
 }  // namespace tensorray

@@ -30,6 +30,12 @@ struct Material {
 /// Whether light may go through the surface.
 bool is_glass(const Material& material);
 
+/// Whether all light from the side of the viewer is scattered alike: f = reflectance / π.
+bool is_diffuse(const Material& material);
+
+/// The factor of the reflectance, in all bands, with which the material reflects uniform light; null: 1.
+const BandValues* mean_fresnel(const Material& material);
+
 /// Takes 10 to 30 ms (integrals over the facets).
 /// @param reflectance  One value for each band. Metals: a factor of Fresnel's reflectance. Glass: a factor of all
 ///                     scattered light. Normally 1 for both.
@@ -43,27 +49,23 @@ struct ViewedMaterial {
   PrincipledView principled;    ///< Of that material only.
 };
 
-/// @param reflectance, wo, first_band  As in `evaluate`.
+/// @param reflectance  Reflectance at the point, 0 to 1 in each band: `material.reflectance`, or that of the surface's
+///                     colours (vertices, textures) at the point.
+/// @param first_band   Of `reflectance`, which may have some of the bands only.
 ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
                       Eigen::Index first_band = 0);
 
 /// Sets f(wi, wo) in every band, without a cosine. It is 0 if a direction lies in the surface (z = 0), and on the far
 /// side of opaque materials.
-/// @param reflectance  Reflectance at the point, 0 to 1 in each band: `material.reflectance`, or that of the surface's
-///                     colours (vertices, textures) at the point.
-/// @param f            One value for each band; overwritten.
-/// @param first_band   Of `reflectance` and `f`, which may have some of the bands only.
+/// @param view, reflectance  Of the point: `viewed` has made the one of the other.
+/// @param f  One value for each band; overwritten.
 /// @return `pdf`, which shares most of the work.
-double evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
-
-/// The same, where several directions light one point. @param view  That of `reflectance`.
 double evaluate(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
                 const Eigen::Vector3d& wi, BandsOut f);
 
 /// The density, per steradian, with which `sample` gives wi; the same for all bands of `reflectance`. Its integral is 1
 /// minus the probability that `sample` returns nothing.
-double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo);
+double pdf(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance, const Eigen::Vector3d& wi);
 
 struct ScatteringSample {
   Eigen::Vector3d wi;
@@ -78,12 +80,7 @@ struct ScatteringSample {
 /// @param weight  f(wi, wo) |cos wi| / pdf for each band; overwritten. Without the factor `refraction` it is usually
 ///                close to the reflectance. Rarely, it reaches 10 (rough plastic, mirrored at a grazing facet), or 30
 ///                in rough glass with an index near 1.
-/// @param first_band  As in `evaluate`.
 /// @return nothing if the path ends here; the weight is then 0.
-std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                                       const Eigen::Vector3d& u, BandsOut weight, Eigen::Index first_band = 0);
-
-/// The same. @param view  As in `evaluate`.
 std::optional<ScatteringSample> sample(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
                                        const Eigen::Vector3d& u, BandsOut weight);
 

@@ -133,8 +133,7 @@ double evaluate(const ConductorScattering& metal, const BandsIn& reflectance, co
   return share * single.pdf + (1 - share) * metal.missing.pdf(wi.z());
 }
 
-Eigen::Vector3d sample(const ConductorScattering& metal, const BandsIn&, const Eigen::Vector3d& wo,
-                       const Eigen::Vector2d& u) {
+Eigen::Vector3d sample(const ConductorScattering& metal, const Eigen::Vector3d& wo, const Eigen::Vector2d& u) {
   Eigen::Vector2d place = u;
   if (choose(single_bounce_share(metal, wo), place.x()))
     return mirrored(wo, ggx_sample_visible(metal.alpha, wo, place));

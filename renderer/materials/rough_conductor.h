@@ -49,7 +49,6 @@ double evaluate(const ConductorScattering& metal, const BandsIn& reflectance, co
 
 /// Samples a direction wi. It may be below the surface, where nothing is reflected.
 /// @param u  In [0, 1)².
-Eigen::Vector3d sample(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                       const Eigen::Vector2d& u);
+Eigen::Vector3d sample(const ConductorScattering& metal, const Eigen::Vector3d& wo, const Eigen::Vector2d& u);
 
 }  // namespace tensorray

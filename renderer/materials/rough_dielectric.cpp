@@ -136,8 +136,7 @@ double evaluate(const DielectricScattering& glass, const BandsIn& reflectance, c
   return density;
 }
 
-Eigen::Vector3d sample(const DielectricScattering& glass, const BandsIn&, const Eigen::Vector3d& wo,
-                       const Eigen::Vector3d& u) {
+Eigen::Vector3d sample(const DielectricScattering& glass, const Eigen::Vector3d& wo, const Eigen::Vector3d& u) {
   const bool outside = wo.z() > 0;
   const View view = view_of(glass, outside);
   const Eigen::Vector3d o = turned(wo, outside);

@@ -32,7 +32,6 @@ double evaluate(const DielectricScattering& glass, const BandsIn& reflectance, c
                 const Eigen::Vector3d& wo, BandsOut f);
 /// @param u  In [0, 1)³; z chooses between reflection and refraction.
 /// May give a zero vector, or a direction for which `evaluate` gives 0: this light is lost between the facets.
-Eigen::Vector3d sample(const DielectricScattering& glass, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                       const Eigen::Vector3d& u);
+Eigen::Vector3d sample(const DielectricScattering& glass, const Eigen::Vector3d& wo, const Eigen::Vector3d& u);
 
 }  // namespace tensorray

@@ -1,5 +1,3 @@
-#include "renderer/meshes/assimp_mesh.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,7 +20,7 @@
 
 #include "base/process/child_program.h"
 #include "base/text/text.h"
-#include "renderer/coverage/polygon.h"
+#include "renderer/meshes/mesh_readers.h"
 
 namespace tensorray {
 namespace {
@@ -35,14 +33,13 @@ void check_face(const aiMesh& part, const aiFace& face) {
     throw std::runtime_error("a face names a vertex that is not there");
 }
 
-void add_face(const TriangleMesh& mesh, const aiFace& face, std::uint32_t offset, bool mirrored,
-              std::vector<Triangle>& triangles) {
-  std::vector<Eigen::Vector3d> corners;
-  for (unsigned i = 0; i < face.mNumIndices; ++i) corners.push_back(mesh.vertices[offset + face.mIndices[i]]);
-  for (Triangle t : triangulate(corners)) {
-    if (mirrored) std::swap(t[1], t[2]);
-    triangles.push_back({offset + face.mIndices[t[0]], offset + face.mIndices[t[1]], offset + face.mIndices[t[2]]});
-  }
+void add_face(const aiFace& face, std::uint32_t offset, bool mirrored, TriangleMesh& mesh) {
+  std::vector<std::uint32_t> corners;
+  for (unsigned i = 0; i < face.mNumIndices; ++i) corners.push_back(offset + face.mIndices[i]);
+  const std::size_t before = mesh.triangles.size();
+  add_polygon(corners, mesh);
+  for (std::size_t i = before; mirrored && i < mesh.triangles.size(); ++i)
+    std::swap(mesh.triangles[i][1], mesh.triangles[i][2]);
 }
 
 Eigen::Affine3d affine_of(const aiMatrix4x4& matrix) {
@@ -73,7 +70,7 @@ void add_mesh(const aiMesh& part, const Eigen::Affine3d& to_world, MeshWithNorma
   for (unsigned i = 0; i < part.mNumFaces; ++i) {
     check_face(part, part.mFaces[i]);
     if (part.mFaces[i].mNumIndices < 3) continue;  // Points and lines have no surface.
-    add_face(mesh, part.mFaces[i], offset, mirrored, mesh.triangles);
+    add_face(part.mFaces[i], offset, mirrored, mesh);
   }
 }
 

@@ -11,10 +11,7 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
-#include "renderer/meshes/assimp_mesh.h"
-#include "renderer/meshes/obj.h"
-#include "renderer/meshes/ply.h"
-#include "renderer/meshes/smooth_normals.h"
+#include "renderer/meshes/mesh_readers.h"
 
 namespace tensorray {
 namespace {

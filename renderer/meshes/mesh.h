@@ -1,16 +1,25 @@
 #pragma once
 /// @file renderer/meshes/mesh.h
-/// Triangle meshes and their files: .ply, .obj, .stl, .off, .gltf, .glb, .dae, .fbx.
+/// Triangle meshes and their files: .ply, .obj, .stl, .off, .gltf, .glb, .dae, .fbx. mesh_readers.h reads the formats.
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include <Eigen/Geometry>
 
+#include "base/geometry/ply_writer.h"
 #include "base/geometry/triangle_mesh.h"
-#include "renderer/meshes/mesh_with_normals.h"
 
 namespace tensorray {
+
+/// Triangles and the normals that shading takes at their corners. A vertex where several normals meet is there several
+/// times, once for each.
+struct MeshWithNormals {
+  TriangleMesh mesh;
+  /// For each vertex, any length; zero: none is known. Empty: no vertex has one.
+  std::vector<Eigen::Vector3f> normals;
+};
 
 /// Reads all meshes of a file as one mesh. Polygons are triangulated, vertices at equal positions are joined, unused
 /// vertices and triangles of zero area are dropped. Positions have the file's precision in .ply, and single precision
@@ -24,6 +33,23 @@ TriangleMesh read_mesh(const std::filesystem::path& path);
 /// @param smooth_angle  Radians: normals are made so that edges look smooth where triangles are turned against each
 /// other by at most this. None: the normals of the file, flat triangles where it has none.
 MeshWithNormals read_mesh_with_normals(const std::filesystem::path& path, std::optional<double> smooth_angle);
+
+/// At each corner of a triangle, the mean normal of the triangles that share the vertex and are turned against this one
+/// by at most `angle` radians, weighted by their angles at the vertex (Thürmer and Wüthrich 1998), so that it does not
+/// depend on how polygons were divided. The other edges stay sharp.
+/// @param mesh  Vertices at equal positions are joined; no triangle has zero area.
+MeshWithNormals with_smooth_normals(const TriangleMesh& mesh, double angle);
+
+/// Writes a mesh in the format that the ending of `path` names. It writes in place and in pieces, so memory does not
+/// grow with the mesh.
+/// - `.ply`: as base/geometry/ply_writer.h.
+/// - `.obj`: text; "v x y z" (with "r g b" from 0 to 1, which most programs read), "vn", "f a//a".
+/// Both formats keep positions in single precision, with the fewest digits that reproduce them (seven to nine). In
+/// .obj, colours have three decimals and normals four: the eye sees no finer difference. Only .ply keeps values.
+/// @throw std::invalid_argument if the ending is another one, the number of attributes differs from the number of
+/// vertices, a vertex is not finite in single precision, or a name has several words; std::runtime_error naming the
+/// file if it cannot be written (also when the disk is full).
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const VertexAttributes& attributes);
 
 /// The parallelepiped that `transform` makes of the box: twelve triangles that face outwards.
 TriangleMesh box_mesh(const Eigen::AlignedBox3d& box, const Eigen::Affine3d& transform);

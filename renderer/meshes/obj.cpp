@@ -1,5 +1,3 @@
-#include "renderer/meshes/obj.h"
-
 #include <array>
 #include <charconv>
 #include <cstdint>
@@ -13,7 +11,7 @@
 
 #include "base/text/parse_number.h"
 #include "base/text/text.h"
-#include "renderer/coverage/polygon.h"
+#include "renderer/meshes/mesh_readers.h"
 
 namespace tensorray {
 namespace {
@@ -27,12 +25,15 @@ struct ObjCorner {
   std::uint32_t vertex = none, normal = none;
 };
 
+struct ObjFace {
+  std::size_t line, end;  ///< `end`: corners of it and all faces before.
+};
+
 struct ObjContents {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Eigen::Vector3f> normals;
-  std::vector<ObjCorner> corners;       ///< Of all faces.
-  std::vector<std::size_t> face_ends;   ///< Corners up to the end of each face.
-  std::vector<std::size_t> face_lines;  ///< The line of each face.
+  std::vector<ObjCorner> corners;  ///< Of all faces.
+  std::vector<ObjFace> faces;
 };
 
 bool is_without_surface(const std::string& keyword) {
@@ -87,8 +88,7 @@ ObjCorner obj_corner_of(const std::string& word, const ObjContents& contents) {
 void read_obj_face(const Words& words, std::size_t line, ObjContents& contents) {
   if (words.size() < 4) throw std::runtime_error("a face needs at least three corners");
   for (std::size_t i = 1; i < words.size(); ++i) contents.corners.push_back(obj_corner_of(words[i], contents));
-  contents.face_ends.push_back(contents.corners.size());
-  contents.face_lines.push_back(line);
+  contents.faces.push_back({line, contents.corners.size()});
 }
 
 void read_obj_statement(const Words& words, std::size_t line, ObjContents& contents) {
@@ -149,19 +149,17 @@ void check_corner(const ObjCorner& corner, const ObjContents& contents) {
 
 /// Adds the face whose corners are [first, end). Each corner becomes a vertex; mesh.cpp joins those that are equal.
 void add_obj_face(const ObjContents& contents, std::size_t first, std::size_t end, MeshWithNormals& result) {
-  const auto offset = static_cast<std::uint32_t>(result.mesh.vertices.size());
-  std::vector<Eigen::Vector3d> positions;
+  std::vector<std::uint32_t> vertices;
   for (std::size_t i = first; i < end; ++i) {
     const ObjCorner& corner = contents.corners[i];
     check_corner(corner, contents);
-    positions.push_back(contents.vertices[corner.vertex]);
+    vertices.push_back(static_cast<std::uint32_t>(result.mesh.vertices.size()));
+    result.mesh.vertices.push_back(contents.vertices[corner.vertex]);
     const bool has_normal = corner.normal != none;
     if (!contents.normals.empty())
       result.normals.push_back(has_normal ? contents.normals[corner.normal] : Eigen::Vector3f(0, 0, 0));
   }
-  result.mesh.vertices.insert(result.mesh.vertices.end(), positions.begin(), positions.end());
-  for (const auto& triangle : triangulate(positions))
-    result.mesh.triangles.push_back({offset + triangle[0], offset + triangle[1], offset + triangle[2]});
+  add_polygon(vertices, result.mesh);
 }
 
 }  // namespace
@@ -170,13 +168,13 @@ MeshWithNormals read_obj(const std::filesystem::path& path) {
   const ObjContents contents = read_contents(path);
   MeshWithNormals result;
   std::size_t first = 0;
-  for (std::size_t face = 0; face < contents.face_ends.size(); ++face) {
+  for (const ObjFace& face : contents.faces) {
     try {
-      add_obj_face(contents, first, contents.face_ends[face], result);
+      add_obj_face(contents, first, face.end, result);
     } catch (const std::runtime_error& error) {
-      throw std::runtime_error("line " + std::to_string(contents.face_lines[face]) + ": " + error.what());
+      throw std::runtime_error("line " + std::to_string(face.line) + ": " + error.what());
     }
-    first = contents.face_ends[face];
+    first = face.end;
   }
   return result;
 }

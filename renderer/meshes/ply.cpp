@@ -1,5 +1,3 @@
-#include "renderer/meshes/ply.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -17,7 +15,7 @@
 #include "base/text/byte_order.h"
 #include "base/text/parse_number.h"
 #include "base/text/text.h"
-#include "renderer/coverage/polygon.h"
+#include "renderer/meshes/mesh_readers.h"
 
 namespace tensorray {
 namespace {
@@ -175,26 +173,16 @@ struct PlyContents {
   std::vector<std::size_t> face_ends;  ///< Corners up to the end of each face.
 };
 
-/// The place of a property among x, y, z, nx, ny, nz; −1: none of them.
-int coordinate_of(const std::string& property) {
+/// Takes a property of the last vertex.
+void take_coordinate(const Property& property, const std::vector<double>& values, PlyContents& contents) {
   static const std::vector<std::string> names{"x", "y", "z", "nx", "ny", "nz"};
-  const auto found = std::find(names.begin(), names.end(), property);
-  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
-}
-
-void read_ply_vertex(const Element& element, Numbers& numbers, PlyContents& contents) {
-  Eigen::Matrix<double, 6, 1> coordinates = Eigen::Matrix<double, 6, 1>::Zero();
-  for (const Property& property : element.properties) {
-    const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
-    const int coordinate = coordinate_of(property.name);
-    contents.has_normals = contents.has_normals || coordinate >= 3;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double value = numbers.next(property.type);
-      if (coordinate >= 0) coordinates[coordinate] = value;
-    }
-  }
-  contents.vertices.emplace_back(coordinates.head<3>());
-  contents.normals.emplace_back(coordinates.tail<3>().cast<float>());
+  const auto place = std::find(names.begin(), names.end(), property.name) - names.begin();
+  contents.has_normals = contents.has_normals || (place >= 3 && place < 6);
+  if (place >= 6 || values.empty()) return;
+  if (place < 3)
+    contents.vertices.back()[place] = values.back();
+  else
+    contents.normals.back()[place - 3] = static_cast<float>(values.back());
 }
 
 std::uint32_t to_index(double value) {
@@ -207,29 +195,18 @@ bool is_corners(const Property& property) {
   return property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index");
 }
 
-void read_ply_face(const Element& element, Numbers& numbers, PlyContents& contents) {
-  for (const Property& property : element.properties) {
-    const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
-    if (is_corners(property) && count < 3)
-      throw std::runtime_error("face " + std::to_string(contents.face_ends.size()) + " has " + std::to_string(count) +
-                               " corners; it needs three");
-    for (std::size_t i = 0; i < count; ++i) {
-      const double value = numbers.next(property.type);
-      if (is_corners(property)) contents.corners.push_back(to_index(value));
-    }
-    if (is_corners(property)) contents.face_ends.push_back(contents.corners.size());
-  }
-}
-
-void pass_over(const Property& property, std::size_t count, Numbers& numbers) {
-  for (std::size_t i = 0; i < count; ++i) numbers.next(property.type);
+void add_ply_face(const std::vector<double>& corners, PlyContents& contents) {
+  if (corners.size() < 3)
+    throw std::runtime_error("face " + std::to_string(contents.face_ends.size()) + " has " +
+                             std::to_string(corners.size()) + " corners; it needs three");
+  for (const double corner : corners) contents.corners.push_back(to_index(corner));
+  contents.face_ends.push_back(contents.corners.size());
 }
 
 /// Adds the triangles of strips: each corner makes one with the two before it, and every second is turned round.
-void add_strips(const Property& property, std::size_t count, Numbers& numbers, PlyContents& contents) {
+void add_strips(const std::vector<double>& corners, PlyContents& contents) {
   std::vector<std::uint32_t> strip;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double index = numbers.next(property.type);
+  for (const double index : corners) {
     if (index == -1) {
       strip.clear();
       continue;
@@ -244,50 +221,40 @@ void add_strips(const Property& property, std::size_t count, Numbers& numbers, P
   }
 }
 
-void read_strips(const Element& element, Numbers& numbers, PlyContents& contents) {
-  for (const Property& property : element.properties) {
-    const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
-    if (is_corners(property))
-      add_strips(property, count, numbers, contents);
-    else
-      pass_over(property, count, numbers);
-  }
-}
-
 void read_element(const Element& element, Numbers& numbers, PlyContents& contents) {
   if (element.properties.empty()) return;  // Such elements have no bytes, whatever count the header gives.
+  const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
+  std::vector<double> values;
   for (std::size_t row = 0; row < element.count; ++row) {
-    if (element.name == "vertex")
-      read_ply_vertex(element, numbers, contents);
-    else if (element.name == "face")
-      read_ply_face(element, numbers, contents);
-    else if (element.name == "tristrips")
-      read_strips(element, numbers, contents);
-    else
-      for (const Property& property : element.properties)
-        pass_over(property, property.is_list ? to_count(numbers.next(property.count_type)) : 1, numbers);
+    if (is_vertex) contents.vertices.emplace_back(0, 0, 0), contents.normals.emplace_back(0, 0, 0);
+    for (const Property& property : element.properties) {
+      values.clear();
+      const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
+      for (std::size_t i = 0; i < count; ++i) values.push_back(numbers.next(property.type));
+      if (is_vertex)
+        take_coordinate(property, values, contents);
+      else if (is_face && is_corners(property))
+        add_ply_face(values, contents);
+      else if (element.name == "tristrips" && is_corners(property))
+        add_strips(values, contents);
+    }
   }
 }
 
-/// Divides the faces into triangles.
 MeshWithNormals mesh_of_ply(PlyContents contents) {
   MeshWithNormals result;
-  std::vector<Eigen::Vector3d> positions;
-  const std::uint32_t* corners = contents.corners.data();
-  std::size_t first = 0;
-  for (const std::size_t end : contents.face_ends) {
-    positions.clear();
-    for (std::size_t i = first; i < end; ++i) {
-      if (corners[i] >= contents.vertices.size()) throw std::runtime_error("a face names a vertex that is not there");
-      positions.push_back(contents.vertices[corners[i]]);
-    }
-    for (const auto& triangle : triangulate(positions))
-      result.mesh.triangles.push_back(
-          {corners[first + triangle[0]], corners[first + triangle[1]], corners[first + triangle[2]]});
-    first = end;
-  }
   result.mesh.vertices = std::move(contents.vertices);
   if (contents.has_normals) result.normals = std::move(contents.normals);
+  std::vector<std::uint32_t> face;
+  auto first = contents.corners.begin();
+  for (const std::size_t end : contents.face_ends) {
+    const auto last = contents.corners.begin() + static_cast<std::ptrdiff_t>(end);
+    face.assign(first, last);
+    first = last;
+    for (const std::uint32_t corner : face)
+      if (corner >= result.mesh.vertices.size()) throw std::runtime_error("a face names a vertex that is not there");
+    add_polygon(face, result.mesh);
+  }
   return result;
 }
 

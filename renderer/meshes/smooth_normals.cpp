@@ -1,11 +1,11 @@
-#include "renderer/meshes/smooth_normals.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
 #include <Eigen/Geometry>
+
+#include "renderer/meshes/mesh.h"
 
 namespace tensorray {
 namespace {

@@ -1,5 +1,3 @@
-#include "renderer/openimageio/picture_files.h"
-
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -16,9 +14,9 @@
 #include <OpenImageIO/imageio.h>
 
 #include "base/text/text.h"
-#include "renderer/images/stored_bytes.h"
+#include "renderer/images/formats.h"
 
-namespace tensorray::openimageio {
+namespace tensorray {
 namespace {
 
 OIIO::TypeDesc type_desc(SampleType type) {
@@ -272,8 +270,6 @@ void turn(int orientation, NativeImage& image) {
   image.samples = target;
 }
 
-}  // namespace
-
 void set_threads(int threads) {
   OIIO::attribute("threads", threads);
   OIIO::attribute("exr_threads", threads > 1 ? threads : threads == 1 ? -1 : 0);  // -1: only the calling thread.
@@ -336,4 +332,9 @@ NativeImage decode_native(const std::filesystem::path& path, const std::string& 
   return image;
 }
 
-}  // namespace tensorray::openimageio
+}  // namespace
+}  // namespace tensorray
+
+/// The functions of the library, found by this name.
+extern "C" __attribute__((visibility("default"))) const tensorray::ImagePlugin tensorray_image_plugin{
+    tensorray::set_threads, tensorray::encode, tensorray::decode, tensorray::decode_native};

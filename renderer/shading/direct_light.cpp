@@ -30,7 +30,7 @@ void seek_bent_light(Wavefront& front, const PathState& path, const StraightRay&
   if (scene.surfaces.occluded(ray.origin, ray.direction, scene.region->entry(ray.origin, ray.direction))) return;
   double factor = std::abs(wi.z()) / density, others = 1;
   if (front.settings.direct == DirectLight::both) {
-    const double ratio = pdf(*vertex.material, vertex.reflectance, wi, vertex.view.wo) / density;
+    const double ratio = pdf(*vertex.material, vertex.view, vertex.reflectance, wi) / density;
     others = 1 + ratio * ratio;
     factor /= others;
   }

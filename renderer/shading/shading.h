@@ -2,7 +2,7 @@
 /// @file renderer/shading/shading.h
 /// The light that a ray sees: path tracing (Kajiya 1986; Veach 1997) and two fast previews.
 ///
-/// The stages stand in files of their own, as free functions of the batch (wavefront.h) and of a path (path_state.h):
+/// The stages stand in files of their own, as free functions of the batch and of a path (wavefront.h):
 /// find_surfaces (shading.cpp) → shade_surface: add_traced_light, sample_direct_light, scatter → wait_at_region →
 /// trace_bent_rays → continue_paths (stages.h), and again from shade_surface on, until no path waits. Without a
 /// BendingRegion no path waits.

@@ -51,7 +51,7 @@ double photon_mis_weight(const Wavefront& front, const Vertex& vertex, const Pho
   const DirectLight direct = front.settings.direct;
   const double scattered = direct == DirectLight::lights && aimed > 0
                                ? 0
-                               : pdf(*vertex.material, vertex.reflectance, vertex.to_local(direction), vertex.view.wo);
+                               : pdf(*vertex.material, vertex.view, vertex.reflectance, vertex.to_local(direction));
   const double by_light = (direct == DirectLight::material ? 0 : aimed) / own, by_material = scattered / own;
   return 1 / (1 + by_light * by_light + by_material * by_material);
 }
@@ -59,7 +59,7 @@ double photon_mis_weight(const Wavefront& front, const Vertex& vertex, const Pho
 /// Sets the sums of the light of photons at the last surface of the path: for each group and for lights without one,
 /// that of area lights after that of others. A diffuse surface scatters all photons of its side alike: its sums are
 /// without its reflectance.
-void sum_photons(Wavefront& front, const PathState& path, bool is_diffuse) {
+void sum_photons(Wavefront& front, const PathState& path, bool diffuse) {
   const Vertex& vertex = path.vertex;
   const PhotonMap& map = photon_map(front.scene, path);
   std::vector<PhotonSum>& sums = front.memory.photon_sums;
@@ -70,7 +70,7 @@ void sum_photons(Wavefront& front, const PathState& path, bool is_diffuse) {
   map.visit(vertex.hit, path.band, [&](const Photon& photon, double density) {
     const Vector3d wi = vertex.to_local(-photon.direction.cast<double>());
     double scattered = density * photon.power;
-    if (!is_diffuse) {
+    if (!diffuse) {
       evaluate(*vertex.material, vertex.view, vertex.reflectance, wi, scattering);
       scattered *= scattering[photon.band - path.first_band()];
     } else if (!(wi.z() * vertex.view.wo.z() > 0)) {
@@ -87,14 +87,14 @@ void sum_photons(Wavefront& front, const PathState& path, bool is_diffuse) {
 }
 
 void add_photons(Wavefront& front, const PathState& path) {
-  const bool is_diffuse = std::holds_alternative<Diffuse>(path.vertex.material->scattering);
-  sum_photons(front, path, is_diffuse);
+  const bool diffuse = is_diffuse(*path.vertex.material);
+  sum_photons(front, path, diffuse);
   BandValues& light = front.memory.contribution;
   for (std::size_t i = 0; i < front.memory.photon_sums.size(); ++i) {
     const PhotonSum& sum = front.memory.photon_sums[i];
     if (sum.light < 0) continue;
     light = path.throughput * sum.scattered;
-    if (is_diffuse) light *= path.vertex.reflectance / pi;
+    if (diffuse) light *= path.vertex.reflectance / pi;
     const bool is_of_area = i % 2 == 1;
     if (is_of_area)
       add_light(front, path, light, {sum.light});

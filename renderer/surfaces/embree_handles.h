@@ -17,6 +17,8 @@
 #include <type_traits>
 #include <vector>
 
+#include <Eigen/Core>
+
 namespace tensorray::embree {
 
 /// Whether Embree can compute with a coordinate: its square fits in single precision. False for NaN.
@@ -28,24 +30,57 @@ inline bool is_valid(const RTCRay& ray) {
          fits(ray.dir_z) && !std::isnan(ray.tfar);
 }
 
-/// A ray that meets nothing.
-inline RTCRay nowhere() {
+inline RTCRay ray_of(const Eigen::Vector3f& origin, const Eigen::Vector3d& direction, double length) {
   RTCRay ray{};
-  ray.dir_x = 1;
-  ray.tfar = -1;
+  ray.org_x = origin.x();
+  ray.org_y = origin.y();
+  ray.org_z = origin.z();
+  ray.dir_x = static_cast<float>(direction.x());
+  ray.dir_y = static_cast<float>(direction.y());
+  ray.dir_z = static_cast<float>(direction.z());
+  ray.tfar = static_cast<float>(length);
+  ray.mask = 0xffffffffu;
   return ray;
 }
 
+/// A ray of a search that has found nothing yet.
+inline RTCRayHit search_along(const RTCRay& ray) {
+  RTCRayHit result{};
+  result.ray = ray;
+  result.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  return result;
+}
+
+#if RTC_VERSION_MAJOR >= 4
+using QueryContext = RTCRayQueryContext;
+constexpr RTCSceneFlags all_triangles_flag = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+
+/// Embree's search for the nearest hit. @param context  To be initialized. @param filter  May refuse hits; or null.
+inline void search(RTCScene scene, RTCRayHit& ray, QueryContext& context, RTCFilterFunctionN filter) {
+  rtcInitRayQueryContext(&context);
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  if (filter)
+    arguments.flags = static_cast<RTCRayQueryFlags>(arguments.flags | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
+  arguments.context = &context;
+  arguments.filter = filter;
+  rtcIntersect1(scene, &ray, &arguments);
+}
+#else
+using QueryContext = RTCIntersectContext;
+constexpr RTCSceneFlags all_triangles_flag = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+
+inline void search(RTCScene scene, RTCRayHit& ray, QueryContext& context, RTCFilterFunctionN filter) {
+  rtcInitIntersectContext(&context);
+  context.filter = filter;
+  rtcIntersect1(scene, &context, &ray);
+}
+#endif
+
 /// Does not change a ray that is not valid: it meets nothing.
 inline void intersect(RTCScene scene, RTCRayHit& ray) {
-  if (!is_valid(ray.ray)) return;
-#if RTC_VERSION_MAJOR >= 4
-  rtcIntersect1(scene, &ray, nullptr);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(scene, &context, &ray);
-#endif
+  QueryContext context;
+  if (is_valid(ray.ray)) search(scene, ray, context, nullptr);
 }
 
 /// The same for rays that go nearly alike, in one call where Embree has one.
@@ -54,7 +89,7 @@ inline void intersect(RTCScene scene, std::vector<RTCRayHit>& rays) {
   for (RTCRayHit& ray : rays) intersect(scene, ray);
 #else
   for (RTCRayHit& ray : rays)
-    if (!is_valid(ray.ray)) ray.ray = nowhere();
+    if (!is_valid(ray.ray)) ray.ray = ray_of({0, 0, 0}, {1, 0, 0}, -1);  // It meets nothing.
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
@@ -62,49 +97,23 @@ inline void intersect(RTCScene scene, std::vector<RTCRayHit>& rays) {
 #endif
 }
 
-/// What a query of all triangles along a ray adds to Embree's context.
-struct AllTriangles {
-#if RTC_VERSION_MAJOR >= 4
-  RTCRayQueryContext context;
-#else
-  RTCIntersectContext context;
-#endif
-  void (*add)(void* user, unsigned geometry, unsigned primitive);
-  void* user;
-
-  /// A filter that refuses all hits, so that the search goes on.
-  static void take(const RTCFilterFunctionNArguments* arguments) {
-    auto* const all = reinterpret_cast<AllTriangles*>(arguments->context);
-    all->add(all->user, RTCHitN_geomID(arguments->hit, arguments->N, 0),
-             RTCHitN_primID(arguments->hit, arguments->N, 0));
-    arguments->valid[0] = 0;
-  }
-};
-
 /// Calls `add` for each triangle along a ray, some of them more than once. The scene needs `all_triangles_flag`.
 inline void visit_all(RTCScene scene, RTCRayHit ray, void (*add)(void*, unsigned, unsigned), void* user) {
-  if (!is_valid(ray.ray)) return;
-  AllTriangles all{{}, add, user};
-#if RTC_VERSION_MAJOR >= 4
-  rtcInitRayQueryContext(&all.context);
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  arguments.flags = static_cast<RTCRayQueryFlags>(arguments.flags | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
-  arguments.context = &all.context;
-  arguments.filter = AllTriangles::take;
-  rtcIntersect1(scene, &ray, &arguments);
-#else
-  rtcInitIntersectContext(&all.context);
-  all.context.filter = AllTriangles::take;
-  rtcIntersect1(scene, &all.context, &ray);
-#endif
-}
+  struct AllTriangles {
+    QueryContext context;  // First, so that its address is that of the whole.
+    void (*add)(void* user, unsigned geometry, unsigned primitive);
+    void* user;
 
-#if RTC_VERSION_MAJOR >= 4
-constexpr RTCSceneFlags all_triangles_flag = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
-#else
-constexpr RTCSceneFlags all_triangles_flag = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
-#endif
+    /// Refuses all hits, so that the search goes on.
+    static void take(const RTCFilterFunctionNArguments* arguments) {
+      auto* const all = reinterpret_cast<AllTriangles*>(arguments->context);
+      all->add(all->user, RTCHitN_geomID(arguments->hit, arguments->N, 0),
+               RTCHitN_primID(arguments->hit, arguments->N, 0));
+      arguments->valid[0] = 0;
+    }
+  } all{{}, add, user};
+  if (is_valid(ray.ray)) search(scene, ray, all.context, AllTriangles::take);
+}
 
 /// Sets tfar to −infinity if the ray meets anything. A ray that is not valid meets nothing.
 inline void occluded(RTCScene scene, RTCRay& ray) {

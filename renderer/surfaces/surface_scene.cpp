@@ -248,17 +248,7 @@ void SurfaceScene::State::attach(unsigned id, const RoundCurves& curves) {
 
 RTCRay SurfaceScene::State::ray(const Vector3d& start, const Vector3d& direction, double distance) const {
   const double scale = 1 / unit;
-  const Vector3f local = (scale * (start - origin)).cast<float>();
-  RTCRay result{};
-  result.org_x = local.x();
-  result.org_y = local.y();
-  result.org_z = local.z();
-  result.dir_x = static_cast<float>(direction.x());
-  result.dir_y = static_cast<float>(direction.y());
-  result.dir_z = static_cast<float>(direction.z());
-  result.tfar = static_cast<float>(scale * distance);
-  result.mask = 0xffffffffu;
-  return result;
+  return embree::ray_of((scale * (start - origin)).cast<float>(), direction, scale * distance);
 }
 
 /// Distance that a ray travels before it comes near the scene. Far from the scene, single precision is not enough.
@@ -337,11 +327,8 @@ const std::vector<ShadedSurface>& SurfaceScene::surfaces() const { return state_
 const Eigen::AlignedBox3d& SurfaceScene::bounds() const { return state_->bounds; }
 
 RTCRayHit SurfaceScene::State::search(const StraightRay& ray) const {
-  RTCRayHit result{};
   const Vector3d start = ray.origin + approach(ray.origin, ray.direction) * ray.direction;
-  result.ray = this->ray(start, ray.direction, std::numeric_limits<double>::infinity());
-  result.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  return result;
+  return embree::search_along(this->ray(start, ray.direction, std::numeric_limits<double>::infinity()));
 }
 
 /// What Embree's `result` of `search` is.
@@ -366,7 +353,7 @@ std::optional<SurfaceHit> SurfaceScene::State::found(const StraightRay& ray, con
     complete(std::get<RoundCurves>(surface.shape), hit);
   }
   hit.distance = (hit.position - ray.origin).dot(ray.direction);
-  if (surface.texture) hit.color = color_at(*surface.texture, hit.position);
+  if (surface.texture) hit.color = surface.texture->color_at(hit.position);
   return found;
 }
 

@@ -118,17 +118,8 @@ RTCRayHit TriangleScene::State::ray(const Eigen::Vector3d& from, const Eigen::Ve
                                     double max_distance) const {
   // Embree finds no hits behind a ray's origin, so the ray starts at `min_distance`.
   const Eigen::Vector3d start = from + min_distance * direction;
-  RTCRayHit result{};
-  result.ray.org_x = local(start.x(), 0);
-  result.ray.org_y = local(start.y(), 1);
-  result.ray.org_z = local(start.z(), 2);
-  result.ray.dir_x = static_cast<float>(direction.x());
-  result.ray.dir_y = static_cast<float>(direction.y());
-  result.ray.dir_z = static_cast<float>(direction.z());
-  result.ray.tfar = static_cast<float>((max_distance - min_distance) / unit);
-  result.ray.mask = 0xffffffffu;
-  result.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  return result;
+  return embree::search_along(embree::ray_of({local(start.x(), 0), local(start.y(), 1), local(start.z(), 2)}, direction,
+                                             (max_distance - min_distance) / unit));
 }
 
 TriangleScene::TriangleScene(const std::vector<const TriangleMesh*>& meshes, const Eigen::Vector3d& origin, double unit)

@@ -61,7 +61,7 @@ ImagePyramid::ImagePyramid(NativeImage image, ColorConversion conversion)
       if (level == 0)
         read_picture(0, y, width(0), row);
       else
-        reduce_row(level - 1, level, 0, y, width(level), row);
+        reduce_row(level, y, row);
     });
     stored_.push_back(std::move(pixels));
   }
@@ -86,17 +86,10 @@ Eigen::Vector4f ImagePyramid::texel(int level, int x, int y) const {
 }
 
 void ImagePyramid::read_row(int level, int x, int y, int count, float* rgba) const {
-  if (const float* const pixels = stored(level)) {
-    const std::size_t first = static_cast<std::size_t>(y) * width(level) + x;
-    std::copy_n(pixels + first * 4, static_cast<std::size_t>(count) * 4, rgba);
-  } else {
-    read_picture(x, y, count, rgba);
-  }
-}
-
-const float* ImagePyramid::stored(int level) const {
-  const auto index = static_cast<std::size_t>(level - first_stored_);
-  return level < first_stored_ || index >= stored_.size() ? nullptr : stored_[index].data();
+  if (level < first_stored_) return read_picture(x, y, count, rgba);
+  const std::size_t first = static_cast<std::size_t>(y) * width(level) + x;
+  std::copy_n(stored_[static_cast<std::size_t>(level - first_stored_)].data() + first * 4,
+              static_cast<std::size_t>(count) * 4, rgba);
 }
 
 void ImagePyramid::read_picture(int x, int y, int count, float* rgba) const {
@@ -104,24 +97,22 @@ void ImagePyramid::read_picture(int x, int y, int count, float* rgba) const {
   convert(image_, conversion_, count, rgba);
 }
 
-/// Averages the pixels of the larger level `from` that each pixel of a row covers.
-void ImagePyramid::reduce_row(int from, int level, int x, int y, int count, float* rgba) const {
+/// Averages the pixels of the level before that each pixel of a row covers.
+void ImagePyramid::reduce_row(int level, int y, float* rgba) const {
+  const int from = level - 1, count = width(level);
   const Cover rows = cover(y, height(level), height(from));
-  const int begin = cover(x, width(level), width(from)).begin,
-            end = cover(x + count - 1, width(level), width(from)).end;
-  std::vector<float> line(static_cast<std::size_t>(end - begin) * 4);
+  std::vector<float> line(static_cast<std::size_t>(width(from)) * 4);
   std::vector<Eigen::Vector4d> sums(count, Eigen::Vector4d::Zero());
   for (int row = rows.begin; row < rows.end; ++row) {
-    read_row(from, begin, row, end - begin, line.data());
+    read_row(from, 0, row, width(from), line.data());
     for (int i = 0; i < count; ++i) {
-      const Cover columns = cover(x + i, width(level), width(from));
+      const Cover columns = cover(i, count, width(from));
       for (int column = columns.begin; column < columns.end; ++column)
-        sums[i] +=
-            rows.weight(row) * columns.weight(column) *
-            Eigen::Map<const Eigen::Vector4f>(&line[static_cast<std::size_t>(column - begin) * 4]).cast<double>();
+        sums[i] += rows.weight(row) * columns.weight(column) *
+                   Eigen::Map<const Eigen::Vector4f>(&line[static_cast<std::size_t>(column) * 4]).cast<double>();
     }
   }
-  const double area = static_cast<double>(width(from)) / width(level) * height(from) / height(level);
+  const double area = static_cast<double>(width(from)) / count * height(from) / height(level);
   for (int i = 0; i < count; ++i)
     Eigen::Map<Eigen::Vector4f>(rgba + static_cast<std::size_t>(i) * 4) = (sums[i] / area).cast<float>();
 }

@@ -34,9 +34,8 @@ class ImagePyramid {
 
  private:
   void read_picture(int x, int y, int count, float* rgba) const;
-  const float* stored(int level) const;
   void read_row(int level, int x, int y, int count, float* rgba) const;
-  void reduce_row(int from, int level, int x, int y, int count, float* rgba) const;
+  void reduce_row(int level, int y, float* rgba) const;
 
   NativeImage image_;
   ColorConversion conversion_;

@@ -1,5 +1,3 @@
-#include "renderer/images/exr_encoder.h"
-
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -9,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "renderer/images/formats.h"
 #include "tests/images/picture_files.h"
 #include "tests/renderer/support.h"
 
@@ -30,12 +29,6 @@ Image picture(int width, int height, std::vector<std::string> channels) {
 std::string file_of(const Image& image, const ImageMetadata& metadata = {}, int threads = 1) {
   const std::vector<unsigned char> bytes = encode_exr(image, metadata, threads);
   return {bytes.begin(), bytes.end()};
-}
-
-/// An attribute of text, as the format stores it.
-std::string attribute(const std::string& name, const std::string& text) {
-  const std::string zero(1, '\0');
-  return name + zero + "string" + zero + little_endian(static_cast<std::int32_t>(text.size())) + text;
 }
 
 TEST(ExrEncoderTest, PicturesAreReadBackBitForBit) {
@@ -71,7 +64,7 @@ TEST(ExrEncoderTest, MetadataIsText) {
                                    {"tensorray:done", "0.5000"},
                                    {"empty", ""},
                                    {std::string(40, 'x'), "long"}})
-    EXPECT_THAT(file, HasSubstr(attribute(name, text)));
+    EXPECT_THAT(file, HasSubstr(exr_attribute(name, "string", text)));
 }
 
 TEST(ExrEncoderTest, MetadataThatTheFormatHasNoPlaceForIsLeftOut) {

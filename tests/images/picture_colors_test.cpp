@@ -15,6 +15,7 @@
 
 #include "renderer/color/chromaticities.h"
 #include "renderer/color/color.h"
+#include "renderer/color/file_colors.h"
 #include "renderer/color/icc_profile.h"
 #include "renderer/textures/texture.h"
 #include "tests/images/picture_files.h"
@@ -33,8 +34,6 @@ const ColorManagement& color() {
   static const ColorManagement management({builtin_config_word, "", ""});
   return management;
 }
-
-double decoded(double value) { return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4); }
 
 /// The mean of a picture in the working space.
 Vector3d light_of(const std::string& name, const std::string& content, const std::string& layer = "",
@@ -74,7 +73,7 @@ std::vector<float> table_of(const std::function<double(double)>& curve) {
   return table;
 }
 
-std::string p3_profile() { return make_icc_profile("P3", p3, table_of(decoded)); }
+std::string p3_profile() { return make_icc_profile("P3", p3, table_of(srgb_light)); }
 
 /// XYZ of a colour by a profile.
 Vector3d xyz_by(const std::string& profile, const Vector3d& color, bool grey = false) {
@@ -87,7 +86,7 @@ Vector3d xyz_by(const std::string& profile, const Vector3d& color, bool grey = f
 
 TEST(PictureColors, PngChunksInTheirOrder) {
   const double half = 128 / 255.0;
-  const Vector3d linear = Vector3d::Constant(half), srgb = Vector3d::Constant(decoded(half));
+  const Vector3d linear = Vector3d::Constant(half), srgb = Vector3d::Constant(srgb_light(half));
   const std::string p3_chunk = chromaticities_chunk(p3_numbers), srgb_chunk = png_chunk("sRGB", std::string(1, '\0'));
   const std::string code_points = png_chunk("cICP", std::string("\x0c\x0d\0\1", 4));
   struct Case {
@@ -132,7 +131,7 @@ TEST(PictureColors, ProfilesThatCannotBeUsedAreSaidAndNotUsed) {
 TEST(IccProfileTest, ReadsWhatItWrites) {
   for (const std::function<double(double)>& curve :
        std::vector<std::function<double(double)>>{[](double x) { return std::pow(x, 2.4); }, [](double x) { return x; },
-                                                  decoded, [](double x) { return 0.2 * x + 0.8 * x * x; }}) {
+                                                  srgb_light, [](double x) { return 0.2 * x + 0.8 * x * x; }}) {
     const std::string profile = make_icc_profile("x", p3, table_of(curve));
     for (double x = 0; x <= 1; x += 1.0 / 32) {
       const Vector3d color(x, 1 - x, 0.5 * x), light = color.unaryExpr(curve);
@@ -229,28 +228,13 @@ TEST(PictureColors, WorkingSpacesHaveTheirPublishedNumbers) {
   for (std::size_t i = 0; i < 8; ++i) EXPECT_NEAR(found[i], numbers_of(odd)[i], 1e-12);
 }
 
-/// A tag of a TIFF and its number.
-using TiffTag = std::pair<int, std::uint32_t>;
-
-/// A TIFF of RGB integers. @param values  One for each sample. @param more  Further tags from 280 on, in their order.
+/// A TIFF of RGB integers. @param values  One for each sample.
 std::string tiff_of(int width, int height, int bits, int orientation, const std::vector<std::uint32_t>& values,
-                    const std::vector<TiffTag>& more = {}) {
+                    TiffTags more = {}) {
   std::string pixels;
   for (const std::uint32_t value : values) pixels += little_endian(value).substr(0, static_cast<std::size_t>(bits / 8));
-  const auto entry = [](int tag, int type, std::uint32_t count, std::uint32_t value) {
-    return little_endian(static_cast<std::uint16_t>(tag)) + little_endian(static_cast<std::uint16_t>(type)) +
-           little_endian(count) + little_endian(value);
-  };
-  const auto size = static_cast<std::uint32_t>(pixels.size()), directory = 16 + size + size % 2;
-  std::string file = std::string("II*\0", 4) + little_endian(directory);
-  for (int i = 0; i < 4; ++i) file += little_endian(static_cast<std::uint16_t>(bits));
-  file += pixels + std::string(size % 2, '\0') + little_endian(static_cast<std::uint16_t>(10 + more.size()));
-  file += entry(256, 4, 1, static_cast<std::uint32_t>(width)) + entry(257, 4, 1, static_cast<std::uint32_t>(height)) +
-          entry(258, 3, 3, 8) + entry(259, 3, 1, 1) + entry(262, 3, 1, 2) + entry(273, 4, 1, 16) +
-          entry(274, 3, 1, static_cast<std::uint32_t>(orientation)) + entry(277, 3, 1, 3) +
-          entry(278, 4, 1, static_cast<std::uint32_t>(height)) + entry(279, 4, 1, size);
-  for (const auto& [tag, number] : more) file += entry(tag, 4, 1, number);
-  return file + little_endian(std::uint32_t{0});
+  more[274] = {1, orientation};
+  return tiff_file(width, height, 3, bits, 2, pixels, more);
 }
 
 /// Headers that contradict the pixels, or other headers: no more is read or written than there is.
@@ -263,7 +247,7 @@ TEST(PictureSizes, AreThoseOfThePixels) {
   constexpr int full_width = 33300, full_height = 33301;
   for (const std::uint32_t size : {0xffffffffu, 0x80000000u, 0x40000000u})
     EXPECT_THAT(message([&] {
-                  light_of("a.tif", tiff_of(1, 1, 8, 1, pixel, {{full_width, size}, {full_height, 1}}));
+                  light_of("a.tif", tiff_of(1, 1, 8, 1, pixel, {{full_width, {1, size}}, {full_height, {1, 1}}}));
                 }),
                 HasSubstr("it may be damaged"))
         << size;
@@ -275,7 +259,7 @@ TEST(PictureColors, IntegersOfAllSizesAreSrgb) {
       const double greatest = std::pow(2, bits) - 1;
       const auto stored = static_cast<std::uint32_t>(std::floor(value * greatest));
       const Vector3d light = light_of("a.tif", tiff_of(1, 1, bits, 1, {stored, 0, stored}));
-      const double expected = decoded(stored / greatest);
+      const double expected = srgb_light(stored / greatest);
       EXPECT_LT((light - Vector3d(expected, 0, expected)).norm(), 1e-5) << bits << " " << value;
     }
 }
@@ -358,21 +342,7 @@ TEST(PictureColors, LightWithoutAlphaIsKept) {
 std::string luminance_chroma(const Vector3d& rgb) {
   const Vector3d weights(0.2126, 0.7152, 0.0722);
   const double luminance = weights.dot(rgb);
-  const std::string zero(1, '\0');
-  const auto attribute = [&](const std::string& name, const std::string& type, const std::string& value) {
-    return name + zero + type + zero + little_endian(static_cast<std::int32_t>(value.size())) + value;
-  };
-  const auto channel = [&](const std::string& name, int sampling) {
-    return name + zero + little_endian(2) + little_endian(0) + little_endian(sampling) + little_endian(sampling);
-  };
-  const std::string box = little_endian(0) + little_endian(0) + little_endian(1) + little_endian(1);
-  std::string file = "\x76\x2f\x31\x01" + little_endian(2) +
-                     attribute("channels", "chlist", channel("BY", 2) + channel("RY", 2) + channel("Y", 1) + zero) +
-                     attribute("compression", "compression", zero) + attribute("dataWindow", "box2i", box) +
-                     attribute("displayWindow", "box2i", box) + attribute("lineOrder", "lineOrder", zero) +
-                     attribute("pixelAspectRatio", "float", little_endian(1.0f)) +
-                     attribute("screenWindowCenter", "v2f", little_endian(0.0f) + little_endian(0.0f)) +
-                     attribute("screenWindowWidth", "float", little_endian(1.0f)) + zero;
+  std::string file = exr_header({0, 0, 1, 1}, {0, 0, 1, 1}, {{"BY", 2}, {"RY", 2}, {"Y", 1}});
   const auto number = [](double value) { return little_endian(static_cast<float>(value)); };
   const std::string pair = number(luminance) + number(luminance);
   const std::string rows[2] = {

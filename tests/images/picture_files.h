@@ -2,12 +2,26 @@
 /// @file tests/images/picture_files.h
 /// Picture files made byte by byte, for features that readers must support but that write_image does not use.
 
+#include <array>
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "renderer/images/image.h"
+
 namespace tensorray {
+
+/// A picture whose values are all different and within [0, 1], and which compresses badly.
+inline Image noise_image(int width, int height, std::vector<std::string> channels = {"R", "G", "B"}) {
+  Image image(width, height, std::move(channels));
+  std::uint32_t state = 1;
+  for (float& value : image.pixels)
+    value = static_cast<float>((state = state * 1664525u + 1013904223u) >> 8) * 0x1p-24f;
+  return image;
+}
 
 /// The bytes of a number, least significant first.
 template <class Number>
@@ -65,25 +79,53 @@ inline std::string png_file(int width, int height, int channels, int bits, const
   return "\x89PNG\r\n\x1A\n" + png_chunk("IHDR", header) + png_chunk("IDAT", zlib_stored(rows)) + png_chunk("IEND", "");
 }
 
+/// Tags of a TIFF: how many 32-bit numbers each has, and the number, or the place of the numbers.
+using TiffTags = std::map<int, std::array<std::int64_t, 2>>;
+
+inline std::string tiff_directory(const TiffTags& tags) {
+  std::string directory = little_endian(static_cast<std::uint16_t>(tags.size()));
+  for (const auto& [tag, numbers] : tags)
+    directory += little_endian(static_cast<std::uint16_t>(tag)) + little_endian(std::uint16_t{4}) +
+                 little_endian(static_cast<std::uint32_t>(numbers[0])) +
+                 little_endian(static_cast<std::uint32_t>(numbers[1]));
+  return directory + little_endian(std::uint32_t{0});
+}
+
+/// A TIFF of one strip. @param photometric  2: RGB, 5: CMYK.
+/// @param more  Further tags, such as 338: the meaning of the channel after the colours (1: alpha, colours multiplied
+/// by it, 2: alpha, colours not multiplied by it).
+inline std::string tiff_file(int width, int height, int channels, int bits, int photometric, const std::string& pixels,
+                             const TiffTags& more = {}) {
+  constexpr int bits_at = 8, pixels_at = 24;
+  const auto size = static_cast<std::int64_t>(pixels.size());
+  TiffTags tags{{256, {1, width}},    {257, {1, height}},      {258, {channels, bits_at}},
+                {259, {1, 1}},        {262, {1, photometric}}, {273, {1, pixels_at}},
+                {277, {1, channels}}, {278, {1, height}},      {279, {1, size}}};
+  tags.insert(more.begin(), more.end());
+  std::string file = std::string("II*\0", 4) + little_endian(static_cast<std::uint32_t>(pixels_at + size + size % 2));
+  for (int i = 0; i < 4; ++i) file += little_endian(static_cast<std::uint32_t>(bits));
+  return file + pixels + std::string(pixels.size() % 2, '\0') + tiff_directory(tags);
+}
+
 /// An RGB TIFF of 64 x 64 pixels of 8 bits in eight strips, whose directory is in front of them. @param is_deflated
 /// Each strip is a stream of zlib. @param first_strip  Where the directory says that the first strip is; 0: where it
 /// is.
 inline std::string striped_tiff(bool is_deflated, std::uint32_t first_strip = 0) {
-  const auto entry = [](int tag, int type, std::uint32_t count, std::uint32_t value) {
-    return little_endian(static_cast<std::uint16_t>(tag)) + little_endian(static_cast<std::uint16_t>(type)) +
-           little_endian(count) + little_endian(value);
-  };
-  constexpr std::uint32_t strips = 8, rows = 8, bits_at = 122, offsets_at = 128, counts_at = offsets_at + 4 * strips;
+  constexpr std::uint32_t strips = 8, rows = 8, bits_at = 122, offsets_at = bits_at + 12, counts_at = offsets_at + 32;
   std::string strip(64 * rows * 3, '\0');
   for (std::size_t i = 0; i < strip.size(); ++i) strip[i] = static_cast<char>(100 + i * i % 101);
   if (is_deflated) strip = zlib_stored(strip);
   const auto size = static_cast<std::uint32_t>(strip.size());
-  std::string file = std::string("II*\0\x08\0\0\0\x09\0", 10);
-  file +=
-      entry(256, 4, 1, 64) + entry(257, 4, 1, 64) + entry(258, 3, 3, bits_at) + entry(259, 3, 1, is_deflated ? 8 : 1);
-  file += entry(262, 3, 1, 2) + entry(273, 4, strips, offsets_at) + entry(277, 3, 1, 3) + entry(278, 4, 1, rows);
-  file += entry(279, 4, strips, counts_at) + std::string(4, '\0');
-  for (int i = 0; i < 3; ++i) file += little_endian(std::uint16_t{8});
+  std::string file = std::string("II*\0\x08\0\0\0", 8) + tiff_directory({{256, {1, 64}},
+                                                                         {257, {1, 64}},
+                                                                         {258, {3, bits_at}},
+                                                                         {259, {1, is_deflated ? 8 : 1}},
+                                                                         {262, {1, 2}},
+                                                                         {273, {strips, offsets_at}},
+                                                                         {277, {1, 3}},
+                                                                         {278, {1, rows}},
+                                                                         {279, {strips, counts_at}}});
+  for (int i = 0; i < 3; ++i) file += little_endian(std::uint32_t{8});
   for (std::uint32_t i = 0; i < strips; ++i)
     file += little_endian(i == 0 && first_strip > 0 ? first_strip : counts_at + 4 * strips + i * size);
   for (std::uint32_t i = 0; i < strips; ++i) file += little_endian(size);
@@ -91,52 +133,42 @@ inline std::string striped_tiff(bool is_deflated, std::uint32_t first_strip = 0)
   return file;
 }
 
-/// A TIFF of one row of 8-bit values. @param photometric  2: RGB, 5: CMYK. @param extra  Meaning of the channel after
-/// the colours. 0: there is none, 1: alpha, colours multiplied by it, 2: alpha, colours not multiplied by it.
-inline std::string tiff_file(int width, int channels, int photometric, int extra, const std::string& values) {
-  const auto entry = [](int tag, int type, std::uint32_t count, std::uint32_t value) {
-    return little_endian(static_cast<std::uint16_t>(tag)) + little_endian(static_cast<std::uint16_t>(type)) +
-           little_endian(count) + little_endian(value);
-  };
-  constexpr std::uint32_t bits_at = 8, pixels_at = 16;
-  const auto size = static_cast<std::uint32_t>(values.size()), directory_at = pixels_at + size + size % 2;
-  std::string file = std::string("II*\0", 4) + little_endian(directory_at);
-  for (int i = 0; i < 4; ++i) file += little_endian(std::uint16_t{8});
-  file += values + std::string(size % 2, '\0') + little_endian(static_cast<std::uint16_t>(extra ? 10 : 9));
-  file += entry(256, 4, 1, width) + entry(257, 4, 1, 1);
-  file += channels == 4 ? entry(258, 3, 4, bits_at) : entry(258, 3, 3, bits_at);
-  file += entry(259, 3, 1, 1) + entry(262, 3, 1, photometric) + entry(273, 4, 1, pixels_at);
-  file += entry(277, 3, 1, channels) + entry(278, 4, 1, 1) + entry(279, 4, 1, size);
-  if (extra) file += entry(338, 3, 1, extra);
-  return file + little_endian(std::uint32_t{0});
-}
-
 /// Bounds of pixels, both inclusive, as in OpenEXR.
 struct ExrWindow {
   int x0, y0, x1, y1;
 };
 
-/// An uncompressed OpenEXR file of 32-bit floats.
-/// @param channels  Names in alphabetical order.
-/// @param values    For each row of the data window, for each channel, its values along the row.
-inline std::string exr_file(const ExrWindow& display, const ExrWindow& data, const std::vector<std::string>& channels,
-                            const std::vector<float>& values) {
+inline std::string exr_attribute(const std::string& name, const std::string& type, const std::string& value) {
   const std::string zero(1, '\0');
-  const auto attribute = [&](const std::string& name, const std::string& type, const std::string& value) {
-    return name + zero + type + zero + little_endian(static_cast<std::int32_t>(value.size())) + value;
-  };
+  return name + zero + type + zero + little_endian(static_cast<std::int32_t>(value.size())) + value;
+}
+
+/// The header of an uncompressed OpenEXR file of 32-bit floats.
+/// @param channels  In alphabetical order; and the distance of their samples along x and y.
+inline std::string exr_header(const ExrWindow& display, const ExrWindow& data,
+                              const std::vector<std::pair<std::string, int>>& channels) {
+  const std::string zero(1, '\0');
   const auto box = [](const ExrWindow& w) {
     return little_endian(w.x0) + little_endian(w.y0) + little_endian(w.x1) + little_endian(w.y1);
   };
   std::string list;
-  for (const std::string& name : channels)
-    list += name + zero + little_endian(2) + little_endian(0) + little_endian(1) + little_endian(1);
-  std::string file = "\x76\x2f\x31\x01" + little_endian(2) + attribute("channels", "chlist", list + zero) +
-                     attribute("compression", "compression", zero) + attribute("dataWindow", "box2i", box(data)) +
-                     attribute("displayWindow", "box2i", box(display)) + attribute("lineOrder", "lineOrder", zero) +
-                     attribute("pixelAspectRatio", "float", little_endian(1.0f)) +
-                     attribute("screenWindowCenter", "v2f", little_endian(0.0f) + little_endian(0.0f)) +
-                     attribute("screenWindowWidth", "float", little_endian(1.0f)) + zero;
+  for (const auto& [name, sampling] : channels)
+    list += name + zero + little_endian(2) + little_endian(0) + little_endian(sampling) + little_endian(sampling);
+  return "\x76\x2f\x31\x01" + little_endian(2) + exr_attribute("channels", "chlist", list + zero) +
+         exr_attribute("compression", "compression", zero) + exr_attribute("dataWindow", "box2i", box(data)) +
+         exr_attribute("displayWindow", "box2i", box(display)) + exr_attribute("lineOrder", "lineOrder", zero) +
+         exr_attribute("pixelAspectRatio", "float", little_endian(1.0f)) +
+         exr_attribute("screenWindowCenter", "v2f", little_endian(0.0f) + little_endian(0.0f)) +
+         exr_attribute("screenWindowWidth", "float", little_endian(1.0f)) + zero;
+}
+
+/// @param channels  Names in alphabetical order.
+/// @param values    For each row of the data window, for each channel, its values along the row.
+inline std::string exr_file(const ExrWindow& display, const ExrWindow& data, const std::vector<std::string>& channels,
+                            const std::vector<float>& values) {
+  std::vector<std::pair<std::string, int>> sampled;
+  for (const std::string& name : channels) sampled.emplace_back(name, 1);
+  std::string file = exr_header(display, data, sampled);
   const std::size_t rows = data.y1 - data.y0 + 1, row_values = values.size() / rows, row_bytes = row_values * 4;
   const std::size_t rows_at = file.size() + rows * 8;
   for (std::size_t row = 0; row < rows; ++row)

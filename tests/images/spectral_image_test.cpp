@@ -1,18 +1,12 @@
 #include "renderer/film/spectral_image.h"
 
-#include <algorithm>
 #include <clocale>
 #include <stdexcept>
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
-
-using ::testing::HasSubstr;
 
 Film counting_film(int width, int height, int channels) {
   Film film(width, height, channels);
@@ -87,26 +81,6 @@ TEST(SpectralImageTest, NamesHaveSixDecimalsInEveryLocale) {
   EXPECT_EQ(image.channels[3], "S0.380,000000nm") << (changed ? changed : "C");
   EXPECT_EQ(image.channels[4], "S0.333,333333nm");
   EXPECT_EQ(image.channels[5], "S0.1250,000000nm");
-}
-
-TEST(SpectralImageTest, SurvivesTheFile) {
-  const Temporary file("layout.exr");
-  const std::vector<Band> bands = make_bands(illuminant("D65"), 380, 730, 32);
-  const SpectralImage spectral =
-      spectral_image(counting_film(5, 4, 32), bands, SpectralQuantity::irradiance, 1, Eigen::Matrix3d::Identity());
-  write_image(file.path(), spectral.image, spectral.metadata);
-  const Image read = read_image(file.path());
-  ASSERT_THAT(read.channels, ::testing::UnorderedElementsAreArray(spectral.image.channels));
-  for (std::size_t c = 0; c < read.channels.size(); ++c) {
-    const auto& names = spectral.image.channels;
-    const std::size_t written = std::find(names.begin(), names.end(), read.channels[c]) - names.begin();
-    for (int y = 0; y < 4; ++y)
-      for (int x = 0; x < 5; ++x) EXPECT_EQ(read.pixel(x, y)[c], spectral.image.pixel(x, y)[written]);
-  }
-  const std::string bytes = read_bytes(file.path());
-  EXPECT_THAT(bytes, HasSubstr("spectralLayoutVersion"));
-  EXPECT_THAT(bytes, HasSubstr("W.m^-2.nm^-1"));
-  EXPECT_THAT(bytes, HasSubstr(spectral.image.channels[3]));
 }
 
 TEST(SpectralImageTest, FilmAndBandsMustAgree) {

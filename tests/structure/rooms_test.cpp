@@ -37,7 +37,7 @@ const std::vector<Room> rooms{
     {"renderer/spectra", {}},
     {"renderer/surfaces", {}},
     {"renderer/coverage", {"renderer/surfaces"}},
-    {"renderer/meshes", {"renderer/coverage"}},
+    {"renderer/meshes", {}},
     {"renderer/color", {"renderer/images"}},
     {"renderer/charts", {"renderer/images"}},
     {"renderer/film", {"renderer/images", "renderer/spectra"}},

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include <gtest/gtest.h>
 
@@ -106,18 +105,6 @@ TEST(Camera, PixelSizeIsTheDistanceOfNeighbours) {
   }
 }
 
-TEST(Camera, RefusesWhatIsNoView) {
-  const Vector3d up = Vector3d::UnitZ();
-  EXPECT_THROW(perspective_camera({1, 2, 3}, {1, 2, 3}, up, 40, {10, 10}), std::invalid_argument);
-  EXPECT_THROW(perspective_camera({0, 0, 0}, {1, 2, std::nan("")}, up, 40, {10, 10}), std::invalid_argument);
-  EXPECT_THROW(perspective_camera({0, 0, 0}, {1, 2, 3}, {0, std::nan(""), 0}, 40, {10, 10}), std::invalid_argument);
-  for (const double angle : {0.0, -1.0, 180.0, std::nan("")})
-    EXPECT_THROW(perspective_camera({0, 0, 0}, {1, 2, 3}, up, angle, {10, 10}), std::invalid_argument);
-  EXPECT_THROW(perspective_camera({0, 0, 0}, {1, 2, 3}, up, 40, {0, 10}), std::invalid_argument);
-  for (const double height : {0.0, -1.0, static_cast<double>(INFINITY), std::nan("")})
-    EXPECT_THROW(orthographic_camera({0, 0, 0}, {1, 2, 3}, up, height, {10, 10}), std::invalid_argument);
-}
-
 /// The extent of a box in the picture, from 0 to 1 along both axes of the picture.
 Eigen::AlignedBox2d extent_in_picture(const Camera& camera, const Eigen::AlignedBox3d& box) {
   Eigen::AlignedBox2d extent;
@@ -186,17 +173,6 @@ TEST(Framing, ShowsWhatHasNoVolume) {
           EXPECT_NEAR(pixel_size(camera, box.center()) * 512 * 0.9, 1, 1e-9);
         }
       }
-}
-
-TEST(Framing, RefusesNothing) {
-  Framing framing;
-  EXPECT_THROW(frame_points({}, framing), std::invalid_argument);
-  EXPECT_THROW(frame_points({{0, 0, 0}, {1, std::nan(""), 0}}, framing), std::invalid_argument);
-  framing.margin = 0.5;
-  EXPECT_THROW(frame_points({{0, 0, 0}}, framing), std::invalid_argument);
-  framing.margin = 0;
-  framing.direction.setZero();
-  EXPECT_THROW(frame_points({{0, 0, 0}}, framing), std::invalid_argument);
 }
 
 }  // namespace

@@ -4,19 +4,12 @@
 #include <functional>
 #include <limits>
 #include <numeric>
-#include <stdexcept>
-#include <string>
 #include <vector>
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
-
-using ::testing::HasSubstr;
 
 const double no_landing = std::numeric_limits<double>::quiet_NaN();
 
@@ -152,35 +145,6 @@ TEST(GridLinesTest, BlendsByOpacityAndMakesOpaque) {
   for (std::size_t i = 0; i < image.pixels.size(); i += 5)
     EXPECT_EQ(std::vector<float>(&image.pixels[i], &image.pixels[i] + 5),
               (std::vector<float>{1.375f, 0.5f, 0.375f, 9, 0.625f}));
-}
-
-TEST(GridLinesTest, SinglePixelAndEmptyPicture) {
-  // Lines at a distance of one pixel are too dense.
-  EXPECT_NEAR(white_pixels(drawn(1, 1, undistorted(1, 1), white_lines(1, 1))), 0, 1e-9);
-  EXPECT_EQ(drawn(0, 0, {}, white_lines(1, 1)).pixels.size(), 0u);
-}
-
-TEST(GridLinesTest, RefusesWhatDoesNotFit) {
-  Image grey(4, 4, {"Y"});
-  EXPECT_THAT(message([&] { draw_grid_lines(grey, undistorted(4, 4), {}); }), HasSubstr("R, G, B"));
-  Image image(4, 4, {"R", "G", "B"});
-  EXPECT_THAT(message([&] { draw_grid_lines(image, undistorted(4, 3), {}); }), HasSubstr("coordinates"));
-  GridLines lines;
-  const auto expect_refusal = [&](const std::string& text) {
-    EXPECT_THROW(draw_grid_lines(image, undistorted(4, 4), lines), std::invalid_argument);
-    EXPECT_THAT(message([&] { draw_grid_lines(image, undistorted(4, 4), lines); }), HasSubstr(text));
-    lines = {};
-  };
-  lines.cells = {0, 4};
-  expect_refusal("cell");
-  lines.width = -1;
-  expect_refusal("width");
-  lines.width = no_landing;
-  expect_refusal("width");
-  lines.opacity = 1.5;
-  expect_refusal("opacity");
-  lines.opacity = no_landing;
-  expect_refusal("opacity");
 }
 
 }  // namespace

@@ -1,26 +1,19 @@
 #include "renderer/charts/lettering.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
-#include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
-
-using ::testing::HasSubstr;
 
 const Eigen::Vector3d white(1, 1, 1);
 
@@ -115,23 +108,6 @@ TEST(LetteringTest, WhatLiesOutsideIsCutOff) {
   EXPECT_GT(ink(drawn("I", 1e-3, {0.5, 0.5}, 1, 1)), 0);
 }
 
-TEST(LetteringTest, LaysItsColorOverThePicture) {
-  Image image(60, 40, {"R", "G", "B", "A", "Z"});
-  for (std::size_t i = 0; i < image.pixels.size(); i += 5)
-    std::copy_n(std::array<float, 5>{0.5f, 0.25f, 1, 0.2f, 7}.begin(), 5, &image.pixels[i]);
-  draw_text(image, {10.4, 30}, 20, "Tag", {0.9, 0, 0.3});
-  const Image mask = drawn("Tag", 20, {10.4, 30}, 60, 40);
-  for (std::size_t i = 0; i < mask.pixels.size(); ++i) {
-    const float* pixel = &image.pixels[5 * i];
-    const float m = mask.pixels[i];
-    ASSERT_NEAR(pixel[0], 0.5f + m * 0.4f, 1e-6);
-    ASSERT_NEAR(pixel[1], 0.25f - m * 0.25f, 1e-6);
-    ASSERT_NEAR(pixel[2], 1 - m * 0.7f, 1e-6);
-    ASSERT_NEAR(pixel[3], 0.2f + m * 0.8f, 1e-6);
-    ASSERT_EQ(pixel[4], 7);
-  }
-}
-
 TEST(LetteringTest, OtherCharactersAreBoxes) {
   const std::vector<float> box = drawn("\t", 20, {5, 25}, 80, 40).pixels;
   for (const char* text : {"\n", "\x7f", "\xC3\xA9", "\xE2\x82\xAC", "\xF0\x9F\x98\x80"}) {
@@ -139,17 +115,6 @@ TEST(LetteringTest, OtherCharactersAreBoxes) {
     EXPECT_EQ(text_width(text, 20), text_width("\t", 20)) << text;
   }
   EXPECT_EQ(drawn("caf\xC3\xA9s", 20, {5, 25}, 120, 40).pixels, drawn("caf\ts", 20, {5, 25}, 120, 40).pixels);
-}
-
-TEST(LetteringTest, RefusesWhatCannotBeDrawn) {
-  Image image(8, 8, {"R", "G", "B"});
-  const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
-  for (const double height : {0.0, -1.0, nan, infinite}) {
-    EXPECT_THROW(draw_text(image, {1, 1}, height, "a", white), std::invalid_argument);
-    EXPECT_THAT(message([&] { draw_text(image, {1, 1}, height, "a", white); }), HasSubstr("height"));
-  }
-  EXPECT_THROW(draw_text(image, {nan, 1}, 5, "a", white), std::invalid_argument);
-  EXPECT_THROW(draw_text(image, {1, infinite}, 5, "a", white), std::invalid_argument);
 }
 
 }  // namespace

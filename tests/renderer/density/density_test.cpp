@@ -233,14 +233,5 @@ TEST(Density, RefusesSumsOfAnotherEstimator) {
   EXPECT_THROW(add_sums(sums_of(one), other), std::runtime_error);
 }
 
-TEST(Density, RefusesSettingsOutOfRange) {
-  EXPECT_THROW(DensityEstimator(0, 5, 1, {}), std::invalid_argument);
-  EXPECT_THROW(DensityEstimator(5, 5, 0, {}), std::invalid_argument);
-  EXPECT_THROW(DensityEstimator(65001, 1, 1, {}), std::invalid_argument);
-  EXPECT_THROW(DensityEstimator(5, 5, 2, {}, {{1, 1, 1}}), std::invalid_argument);
-  EXPECT_THROW(DensityEstimator(5, 5, 1, {DensityKind::gaussian, 0}), std::invalid_argument);
-  EXPECT_THROW(DensityEstimator(5, 5, 1, {DensityKind::gaussian, std::nan("")}), std::invalid_argument);
-}
-
 }  // namespace
 }  // namespace tensorray

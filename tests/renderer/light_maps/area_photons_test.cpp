@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include "base/constants.h"
+#include "base/geometry/box.h"
 #include "renderer/light_maps/photon_tracer.h"
 #include "renderer/shading/shading.h"
+#include "tests/renderer/shapes.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {
@@ -27,14 +27,7 @@ class BendingPlane : public BendingRegion {
   explicit BendingPlane(double angle, double steeper = 1) : angle_(angle), steeper_(steeper) {}
 
   double entry(const Vector3d& origin, const Vector3d& direction) const override {
-    double enters = 0, leaves = INFINITY;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double size = axis < 2 ? half_size : half_height;
-      const double a = (-size - origin[axis]) / direction[axis], b = (size - origin[axis]) / direction[axis];
-      enters = std::max(enters, std::min(a, b));
-      leaves = std::min(leaves, std::max(a, b));
-    }
-    return leaves > enters ? enters : INFINITY;
+    return box_entry({half_size, half_size, half_height}, origin, direction);
   }
 
   void trace_radiance(std::vector<BentRay>& rays) const override {
@@ -69,11 +62,8 @@ class BendingPlane : public BendingRegion {
 };
 
 std::vector<Vector3d> corners() {
-  std::vector<Vector3d> result;
-  for (int i = 0; i < 8; ++i)
-    result.push_back(
-        {(i % 2 - 0.5) * 2 * half_size, (i / 2 % 2 - 0.5) * 2 * half_size, (i / 4 - 0.5) * 2 * half_height});
-  return result;
+  const Vector3d half(half_size, half_size, half_height);
+  return corners_of({-half, half});
 }
 
 AreaLight lamp() { return {rectangle_mesh({1.8, 0.2, 3}, {1, 0, 0}, {0, -1, 0}, {1.2, 0.9}), {5, 7}}; }
@@ -222,20 +212,6 @@ TEST(AreaPhotonsTest, PowerIsThatOfTheLampTowardsTheVolume) {
   EXPECT_EQ(photons.counts[0][0] + photons.counts[0][1] + photons.counts[0][2] + photons.counts[0][3], 40000u * bands);
   ASSERT_TRUE(photons.areas[0]);
   EXPECT_EQ(photons.areas[0]->count, 40000);
-}
-
-TEST(AreaPhotonsTest, TheSameBytesOnAnyNumberOfThreads) {
-  std::vector<PhotonMaps> results;
-  for (const std::size_t threads : {1, 2, 7}) {
-    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    results.push_back(Stage(BendingPlane(0.3), Diffuse{}, 3000, 4).photons);
-  }
-  for (const PhotonMaps& result : results) {
-    const auto &photons = result.passes[3].photons(), &first = results[0].passes[3].photons();
-    ASSERT_EQ(photons.size(), first.size());
-    ASSERT_GT(photons.size(), 1000u);
-    EXPECT_EQ(std::memcmp(photons.data(), first.data(), photons.size() * sizeof(Photon)), 0);
-  }
 }
 
 /// Photons of a lamp within the region start in all directions, as it shines.

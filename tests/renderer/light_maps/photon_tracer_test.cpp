@@ -8,10 +8,12 @@
 #include <tbb/global_control.h>
 
 #include "base/constants.h"
+#include "base/geometry/box.h"
 #include "base/process/job.h"
 #include "renderer/sampling/random.h"
 #include "renderer/shading/shading.h"
 #include "tests/base/rank_support.h"
+#include "tests/renderer/shapes.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {
@@ -28,13 +30,7 @@ class ClearCube : public BendingRegion {
   explicit ClearCube(double radiance_scale = 1, bool stops = false) : radiance_scale_(radiance_scale), stops_(stops) {}
 
   double entry(const Vector3d& origin, const Vector3d& direction) const override {
-    double enters = 0, leaves = INFINITY;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double a = (-0.5 - origin[axis]) / direction[axis], b = (0.5 - origin[axis]) / direction[axis];
-      enters = std::max(enters, std::min(a, b));
-      leaves = std::min(leaves, std::max(a, b));
-    }
-    return leaves > enters ? enters : INFINITY;
+    return box_entry(Vector3d::Constant(0.5), origin, direction);
   }
 
   void trace_radiance(std::vector<BentRay>& rays) const override { trace_importance(rays); }
@@ -51,12 +47,6 @@ class ClearCube : public BendingRegion {
   double radiance_scale_;
   bool stops_;
 };
-
-std::vector<Vector3d> unit_corners() {
-  std::vector<Vector3d> result;
-  for (int i = 0; i < 8; ++i) result.push_back({i % 2 - 0.5, i / 2 % 2 - 0.5, static_cast<double>(i / 4) - 0.5});
-  return result;
-}
 
 /// A floor at `height`, of a size, and perhaps a roof above everything.
 SurfaceScene floor_at(double height, double size, bool roof = false) {
@@ -80,7 +70,8 @@ PhotonTracerSettings settings_of(std::uint64_t per_pass, int passes = 1, double 
 
 PhotonMaps traced(const BendingRegion& region, const SurfaceScene& surfaces, const std::vector<Light>& lights,
                   const PhotonTracerSettings& settings) {
-  return trace_photons(region, unit_corners(), surfaces, lights, settings, {});
+  return trace_photons(region, corners_of({Vector3d::Constant(-0.5), Vector3d::Constant(0.5)}), surfaces, lights,
+                       settings, {});
 }
 
 SurfaceHit floor_point(const SurfaceScene& surfaces, double x, double y) {
@@ -270,7 +261,8 @@ TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
 
 TEST(PhotonTracerTest, TheSameBytesOnAnyNumberOfThreads) {
   const SurfaceScene floor = floor_at(-0.8, 40);
-  const std::vector<Light> lights{sun({0.1, 0, -1}, 0.05), PointLight{{0, 0, 2}, {5, 7}}};
+  const std::vector<Light> lights{sun({0.1, 0, -1}, 0.05), PointLight{{0, 0, 2}, {5, 7}},
+                                  AreaLight{rectangle_mesh({1, 0, 3}, {1, 0, 0}, {0, -1, 0}, {1, 1}), {5, 7}}};
   std::vector<PhotonMaps> results;
   for (const std::size_t threads : {1, 2, 7}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);

@@ -11,6 +11,7 @@
 #include "base/constants.h"
 #include "renderer/sampling/random.h"
 #include "renderer/sampling/sampling.h"
+#include "tests/renderer/shapes.h"
 #include "tests/renderer/statistics.h"
 #include "tests/renderer/support.h"
 
@@ -26,17 +27,6 @@ const Eigen::AlignedBox3d unit_scene(Vector3d(-1, -1, -1), Vector3d(1, 1, 1));
 AreaLight lamp(float radiance) {
   const Vector3d right(0.8, 0, -0.6), up(0, -1, 0);
   return {rectangle_mesh({0.3, -0.2, 1.5}, right, up, {2, 1.2}), {radiance}};
-}
-
-/// Lambert's formula (Schröder and Hanrahan 1993, "On the Form Factor Between Two Polygons"): the irradiance from a
-/// polygon of radiance 1 that is completely above the horizon of the surface.
-double polygon_irradiance(const std::vector<Vector3d>& polygon, const Vector3d& point, const Vector3d& normal) {
-  double sum = 0;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vector3d a = (polygon[i] - point).normalized(), b = (polygon[(i + 1) % polygon.size()] - point).normalized();
-    sum += std::acos(a.dot(b)) * a.cross(b).normalized().dot(normal) / 2;
-  }
-  return std::abs(sum);
 }
 
 /// The irradiance of a surface without occluders, estimated as a renderer would do it.

@@ -2,14 +2,12 @@
 
 #include <cmath>
 #include <complex>
-#include <stdexcept>
 
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
 #include "renderer/materials/rough_conductor.h"
 #include "renderer/sampling/random.h"
-#include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
@@ -106,13 +104,6 @@ TEST(MetalTest, HasThePublishedValuesAndTheirMeans) {
   EXPECT_NEAR(gold.n[1], 0.36, 1e-12);
   EXPECT_NEAR(gold.k[2], 1.871, 1e-12);
   EXPECT_NEAR(gold.k[3], 5.663, 1e-12);
-}
-
-TEST(MetalTest, UnknownNamesAreRefused) {
-  const std::string text = message([] { metal_index("gould", {500}); });
-  EXPECT_NE(text.find("gould"), std::string::npos);
-  for (const char* const name : {"gold", "silver", "copper", "aluminium"})
-    EXPECT_NE(text.find(name), std::string::npos) << name;
 }
 
 }  // namespace

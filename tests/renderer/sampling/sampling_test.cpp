@@ -18,20 +18,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Counts in 32 x 32 bins of the unit square. Points on the right and upper edges count in the last bins.
-template <class Point>
-double square_score(const Point& point) {
-  std::vector<int> counts(32 * 32);
-  const auto bin = [](double x) { return std::min(static_cast<int>(x * 32), 31); };
-  for (int i = 0; i < 65536; ++i) {
-    const Vector2d p = point(i);
-    EXPECT_GE(p.minCoeff(), 0);
-    EXPECT_LE(p.maxCoeff(), 1 + 1e-12);
-    ++counts[bin(p.x()) * 32 + bin(p.y())];
-  }
-  return chi_square_score(counts);
-}
-
 Vector2d uniform(int i) { return {random_uniform(11, i, 0), random_uniform(11, i, 1)}; }
 
 double turn(double x, double y) { return std::atan2(y, x) / (2 * pi) + 0.5; }
@@ -53,20 +39,6 @@ TEST(PathSampler, IsAFunctionOfItsKeys) {
         EXPECT_EQ(jump.next_1d(), again.next_1d());
       }
   EXPECT_GT(values.size(), 8190u);  // Of 8192 multiples of 2^-32.
-}
-
-TEST(PathSampler, SamplesOfAPixelFillEveryElementaryInterval) {
-  for (const std::uint64_t pixel : {0u, 1u, 1000000u})
-    for (std::uint32_t dimension = 0; dimension < 20; dimension += 7)
-      for (int k = 0; k <= 8; k += 2)
-        for (int i = 0; i <= k; ++i) {
-          std::vector<int> counts(1 << k);
-          for (std::uint32_t sample = 0; sample < (1u << k); ++sample) {
-            const Vector2d p = PathSampler{1, pixel, sample, dimension}.next_2d();
-            ++counts[(static_cast<int>(std::ldexp(p.x(), i)) << (k - i)) + static_cast<int>(std::ldexp(p.y(), k - i))];
-          }
-          for (const int count : counts) ASSERT_EQ(count, 1) << pixel << " " << dimension << " " << k << " " << i;
-        }
 }
 
 TEST(PathSampler, SingleNumbersAreStratified) {

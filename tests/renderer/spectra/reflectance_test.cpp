@@ -4,15 +4,12 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <stdexcept>
 #include <string>
 
 #include <Eigen/LU>
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "renderer/color/color.h"
-#include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
@@ -139,15 +136,6 @@ TEST(ReflectanceTest, SpectraOfTheModelAreFoundAgain) {
   }
 }
 
-/// A smooth reflectance similar to measured ones.
-struct Bump {
-  double center, width;
-  double at(double wavelength) const {
-    const double x = (wavelength - center) / width;
-    return 0.15 + 0.6 * std::exp(-x * x / 2);
-  }
-};
-
 TEST(ReflectanceTest, SpectraAreSmooth) {
   // No feature is narrower than 20 nm.
   constexpr double steepest_bend = 1.0 / (20 * 20);
@@ -208,11 +196,6 @@ TEST(ReflectanceTest, ScalesAboveOneAndNearBlack) {
       for (const double wavelength : {400.0, 500.0, 600.0, 700.0})
         EXPECT_NEAR(spectrum.at(wavelength) / factor, scene.model.spectrum(rgb).at(wavelength), 1e-5);
     }
-}
-
-TEST(ReflectanceTest, NeedsBands) {
-  EXPECT_THROW(ReflectanceModel({}, Matrix3d::Identity()), std::invalid_argument);
-  EXPECT_THAT(message([] { ReflectanceModel({}, Matrix3d::Identity()); }), ::testing::HasSubstr("at least one band"));
 }
 
 TEST(ReflectanceTest, LightOfOneWavelength) {

@@ -13,6 +13,7 @@
 #include "renderer/meshes/mesh.h"
 #include "renderer/sampling/random.h"
 #include "renderer/sampling/sampling.h"
+#include "tests/renderer/shapes.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {
@@ -52,34 +53,6 @@ std::optional<BoxCrossing> cross_box(const Eigen::AlignedBox3d& box, const Vecto
   Vector3d normal = Vector3d::Zero();
   normal[axis] = (direction[axis] > 0) == within ? 1 : -1;
   return BoxCrossing{within ? leave : enter, normal};
-}
-
-ShadedSurface surface_of(TriangleMesh mesh) {
-  ShadedSurface surface;
-  surface.shape = std::move(mesh);
-  return surface;
-}
-
-/// A sphere of radius 1 with smooth normals; its colours and data are z.
-ShadedSurface sphere(int rings, const Vector3d& center = Vector3d::Zero()) {
-  TriangleMesh mesh;
-  ShadedSurface surface;
-  const auto around = static_cast<std::uint32_t>(2 * rings);
-  for (int ring = 0; ring <= rings; ++ring)
-    for (std::uint32_t i = 0; i < around; ++i) {
-      const double polar = pi * ring / rings, turn = 2 * pi * i / around;
-      const Vector3d n(std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar));
-      mesh.vertices.push_back(center + n);
-      surface.normals.push_back(n.cast<float>());
-    }
-  for (std::uint32_t ring = 0; ring < static_cast<std::uint32_t>(rings); ++ring)
-    for (std::uint32_t i = 0; i < around; ++i) {
-      const std::uint32_t a = ring * around + i, b = ring * around + (i + 1) % around;
-      if (ring > 0) mesh.triangles.push_back({a, a + around, b});
-      if (ring + 1 < static_cast<std::uint32_t>(rings)) mesh.triangles.push_back({a + around, b + around, b});
-    }
-  surface.shape = std::move(mesh);
-  return surface;
 }
 
 ShadedSurface curve(const std::vector<Vector3d>& points, const std::vector<float>& radii) {

@@ -229,30 +229,22 @@ TEST(TriangleScene, ThreadsMaySearchAtOnce) {
   const TriangleScene scene = std::move(built);
   std::vector<std::pair<Vector3d, Vector3d>> rays;
   for (int i = 0; i < 2000; ++i) rays.emplace_back(soup.random.point(1), soup.random.point(1).normalized());
-  struct Found {
-    std::optional<TriangleHit> nearest;
-    std::vector<TriangleId> near;
-  };
-  const auto search = [&](std::size_t i) {
-    const auto& [from, direction] = rays[i];
-    Found found{scene.nearest(from, direction, -1, infinite), {}};
-    scene.near(from, 0.1, found.near);
-    return found;
-  };
-  std::vector<Found> together(rays.size());
-  tbb::parallel_for(std::size_t{0}, rays.size(), [&](std::size_t i) { together[i] = search(i); });
+  std::vector<std::optional<TriangleHit>> together(rays.size());
+  std::vector<std::vector<TriangleId>> near(rays.size());
+  tbb::parallel_for(std::size_t{0}, rays.size(), [&](std::size_t i) {
+    together[i] = scene.nearest(rays[i].first, rays[i].second, -1, infinite);
+    scene.near(rays[i].first, 0.1, near[i]);
+  });
   std::size_t hits = 0, candidates = 0;
+  std::vector<TriangleId> alone;
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Found alone = search(i);
-    const Found& other = together[i];
-    ASSERT_EQ(alone.nearest.has_value(), other.nearest.has_value());
-    if (alone.nearest) {
-      ASSERT_TRUE(same(*alone.nearest, *other.nearest));
-      ++hits;
-    }
-    ASSERT_TRUE(std::equal(alone.near.begin(), alone.near.end(), other.near.begin(), other.near.end(),
-                           same<TriangleId, TriangleId>));
-    candidates += alone.near.size();
+    const auto hit = scene.nearest(rays[i].first, rays[i].second, -1, infinite);
+    ASSERT_EQ(hit.has_value(), together[i].has_value());
+    ASSERT_TRUE(!hit || same(*hit, *together[i]));
+    scene.near(rays[i].first, 0.1, alone);
+    ASSERT_TRUE(std::equal(alone.begin(), alone.end(), near[i].begin(), near[i].end(), same<TriangleId, TriangleId>));
+    hits += hit ? 1 : 0;
+    candidates += alone.size();
   }
   EXPECT_GT(hits, 500u);
   EXPECT_GT(candidates, 500u);

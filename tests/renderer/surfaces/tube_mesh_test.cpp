@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
+#include "tests/renderer/shapes.h"
 
 namespace tensorray {
 namespace {
@@ -60,13 +61,6 @@ TubeSettings settings_of(TubeStyle style, TubeCaps caps, double tolerance = 0) {
 
 TubeMesh solid(const Tube& tube, TubeCaps caps = TubeCaps::flat, double tolerance = 0) {
   return make_tube_mesh({tube}, settings_of(TubeStyle::solid, caps, tolerance));
-}
-
-double volume(const TriangleMesh& mesh) {
-  double sum = 0;
-  for (const auto& t : mesh.triangles)
-    sum += mesh.vertices[t[0]].dot(mesh.vertices[t[1]].cross(mesh.vertices[t[2]])) / 6;
-  return sum;
 }
 
 /// For each edge, how often it occurs in its direction minus how often in the opposite one, and how often in total.
@@ -291,24 +285,6 @@ TEST(TubeMesh, TheNumberOfTrianglesIsBounded) {
   // However small the tolerance is, a solid tube has 64 rings for each of its points.
   settings = settings_of(TubeStyle::solid, TubeCaps::open, 1e-300);
   EXPECT_LE(make_tube_mesh({arc(0.2, 2, 5)}, settings).mesh.vertices.size(), 5u * 64 * 64);
-}
-
-TEST(TubeMesh, RefusesWhatIsOutOfRange) {
-  const Tube tube = straight_tube(0.3, 0.2, 2, 3);
-  const auto refused = [&](auto&& change) {
-    TubeSettings settings;
-    change(settings);
-    EXPECT_THROW(make_tube_mesh({tube}, settings), std::invalid_argument);
-  };
-  refused([](TubeSettings& s) { s.tolerance = -1; });
-  refused([](TubeSettings& s) { s.spacing = std::nan(""); });
-  refused([](TubeSettings& s) { s.min_segments = 2; });
-  refused([](TubeSettings& s) { s.max_segments = 5; });
-  refused([](TubeSettings& s) { s.lines = -1; });
-  refused([](TubeSettings& s) { s.max_triangles = std::uint64_t{1} << 32; });
-  Tube flat = tube;
-  flat[1].y = flat[1].x;
-  EXPECT_THROW(make_tube_mesh({flat}, {}), std::invalid_argument);
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -124,21 +123,8 @@ TEST(EnvironmentMap, SamplesFollowTheDensity) {
     ASSERT_NEAR(d.norm(), 1, 1e-14);
     ++counts[bin(d)];
   }
-  // Bins with few expected samples are not normally distributed: merge them into one.
-  double total = 0, rare_weight = 0;
-  for (const double w : weights) total += w;
-  int rare_count = 0;
-  std::vector<int> kept_counts;
-  std::vector<double> kept_weights;
-  for (int i = 0; i < rows * columns; ++i) {
-    const bool is_rare = weights[i] / total * 50000 < 10;
-    (is_rare ? rare_count : kept_counts.emplace_back()) += counts[i];
-    (is_rare ? rare_weight : kept_weights.emplace_back()) += weights[i];
-  }
-  kept_counts.push_back(rare_count);
-  kept_weights.push_back(rare_weight);
-  EXPECT_GT(kept_counts.size(), 20u);
-  EXPECT_LT(std::abs(chi_square_score(kept_counts, kept_weights)), 4);
+  EXPECT_GT(std::count_if(counts.begin(), counts.end(), [](int count) { return count > 10; }), 20);
+  EXPECT_LT(std::abs(chi_square_score(counts, weights)), 4);
 }
 
 TEST(EnvironmentMap, LightIsNeverMissed) {
@@ -176,22 +162,6 @@ TEST(EnvironmentMap, WhatIsNoLightIsDark) {
   const EnvironmentMap black(light, {1});
   EXPECT_EQ(black.importance(), 0);
   EXPECT_NEAR(black.sample({0.3, 0.7}).norm(), 1, 1e-14);
-}
-
-TEST(EnvironmentMap, RefusesWhatDoesNotFit) {
-  EXPECT_THROW(EnvironmentMap(EnvironmentLight(), {1}), std::invalid_argument);
-  EXPECT_THROW(EnvironmentMap(grey(4, 2), {1, 1}), std::invalid_argument);
-  EnvironmentLight light = grey(4, 2);
-  light.picture.pixels.pop_back();
-  EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
-  light = grey(4, 2);
-  light.channel_spectra(0, 0) = -1;
-  EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
-  light = grey(4, 2);
-  light.to_world(0, 0) = -1;  // A reflection.
-  EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
-  light.to_world = 2 * Eigen::Matrix3d::Identity();
-  EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,5 +1,3 @@
-#include "renderer/meshes/mesh_files.h"
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -11,6 +9,7 @@
 #include "base/errors.h"
 #include "base/files/file_in_pieces.h"
 #include "base/text/text.h"
+#include "renderer/meshes/mesh.h"
 
 namespace tensorray {
 namespace {

@@ -1,6 +1,4 @@
-#include "renderer/shading/path_state.h"
-
-#include <variant>
+#include "renderer/shading/wavefront.h"
 
 namespace tensorray {
 namespace {
@@ -50,8 +48,7 @@ void meet_surface(const ShadedScene& scene, const SurfaceHit& hit, const Vector3
 }
 
 Eigen::Vector3f albedo(const ShadedScene& scene, const SurfaceHit& hit, BandValues& reflectance) {
-  if (const auto* metal = std::get_if<ConductorScattering>(&material_of(scene, hit).scattering))
-    reflectance *= metal->mean_fresnel;
+  if (const BandValues* const fresnel = mean_fresnel(material_of(scene, hit))) reflectance *= *fresnel;
   return scene.colors.color(reflectance);
 }
 

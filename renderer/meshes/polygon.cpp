@@ -1,12 +1,13 @@
-#include "renderer/coverage/polygon.h"
-
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
 #include <Eigen/Geometry>
+
+#include "renderer/meshes/mesh_readers.h"
 
 namespace tensorray {
 namespace {
@@ -110,8 +111,7 @@ std::vector<std::array<std::uint32_t, 3>> fan(std::size_t corners) {
   return triangles;
 }
 
-}  // namespace
-
+/// Triangles of a polygon, with the order of its corners; an index names a corner.
 std::vector<std::array<std::uint32_t, 3>> triangulate(const std::vector<Vector3d>& corners) {
   const Vector3d normal = newell_normal(corners);
   if (corners.size() == 3 || !(normal.squaredNorm() > 0)) return fan(corners.size());
@@ -135,6 +135,14 @@ std::vector<std::array<std::uint32_t, 3>> triangulate(const std::vector<Vector3d
   }
   triangles.push_back(ring.triangle_at(1));
   return triangles;
+}
+
+}  // namespace
+
+void add_polygon(const std::vector<std::uint32_t>& corners, TriangleMesh& mesh) {
+  std::vector<Vector3d> positions;
+  for (const std::uint32_t corner : corners) positions.push_back(mesh.vertices[corner]);
+  for (const auto& [a, b, c] : triangulate(positions)) mesh.triangles.push_back({corners[a], corners[b], corners[c]});
 }
 
 }  // namespace tensorray
