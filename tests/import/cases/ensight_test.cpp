@@ -109,6 +109,15 @@ TEST(EnSight, StepsInOneFileAreRefusedWhereOthersHaveNone) {
 }
 
 /// VTK itself repeats the last number of a text that is cut off, and goes on for ever with some damaged cases.
+TEST(EnSight, DescriptionsAnnounceNothing) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  const std::string text = bytes_of(folder / "a.geo");
+  const std::size_t second = text.find('\n') + 1, third = text.find('\n', second) + 1;
+  write_bytes(folder / "a.geo", "point\n99999999 particles in the run\n" + text.substr(third));
+  EXPECT_EQ(read_error(folder / "a.case"), "");
+}
+
 TEST(EnSight, WhatIsCutOffOrMissingIsNamed) {
   const TemporaryFolder folder;
   const auto error = [&] { return read_error(folder / "a.case"); };

@@ -18,7 +18,7 @@
 #include <vtkSmartPointer.h>
 
 #include "base/errors.h"
-#include "base/process/process_limits.h"
+#include "base/text/short_lines.h"
 #include "base/text/text.h"
 
 namespace tensorray {
@@ -198,6 +198,27 @@ void require_no_devices(const Entry& entry, const fs::path& folder) {
   }
 }
 
+/// The readers of text take time, and memory, for as many points and cells as a part announces. @throw
+/// std::runtime_error naming the file, if a line after the name of a type announces more than there are bytes.
+void check_counts(const fs::path& path) {
+  static const std::set<std::string> types{"coordinates", "point",   "bar2",   "bar3",    "tria3",    "tria6",
+                                           "quad4",       "quad8",   "tetra4", "tetra10", "pyramid5", "pyramid13",
+                                           "penta6",      "penta15", "hexa8",  "hexa20",  "nsided",   "nfaced"};
+  const auto most = static_cast<double>(fs::file_size(path));
+  std::string before;
+  int left_out = 2;  // Lines of a description, or of a part's number and description.
+  for_each_short_line(path, 80, [&](const std::string& line) {
+    if (left_out-- > 0) return true;
+    const std::string text = trimmed(line);
+    if (types.count(before) > 0 && std::strtod(text.c_str(), nullptr) > most)
+      fail(path, "is damaged or cut off: it announces \"" + before + " " + escaped(text) +
+                     "\", which it cannot hold; copy or write it again");
+    left_out = text == "part" ? 2 : 0;
+    before = starts_with(text, "g_") ? text.substr(2) : text;
+    return true;
+  });
+}
+
 /// In a case with file sets VTK seeks the steps in all files, and goes on for ever in one without.
 void check_file_sets(const std::vector<Entry>& entries, const EnSightCase& given) {
   const auto is_set = [](const Entry& entry) { return entry.section == "FILE" && entry.name == "file set"; };
@@ -228,9 +249,6 @@ void check_ends(const EnSightCase& given, vtkDataObject& read) {
 
 vtkSmartPointer<vtkDataObject> read_step(const fs::path& path, std::size_t step) {
   const EnSightCase given = ensight_case(path, step);
-  double memory = 0;
-  for (const EnSightFile& file : given.files) memory += max_memory_of(file.file);
-  const ExtraMemoryLimit limit(memory);
   vtkNew<vtkGenericEnSightReader> reader;
   reader->SetCaseFileName(fs::absolute(path).c_str());
   reader->UpdateInformation();
@@ -266,6 +284,7 @@ EnSightCase ensight_case(const fs::path& path, std::size_t step) {
     if (name.empty()) continue;
     if (!fs::is_regular_file(file))
       fail(file, "is missing, which " + path.filename().string() + " names; copy it there too");
+    if (is_model) check_counts(file);
     result.files.push_back({entry.name, file});
   }
   check_file_sets(entries, result);

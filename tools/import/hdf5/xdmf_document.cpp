@@ -91,6 +91,9 @@ std::vector<Element*> XdmfDocument::children(Element& element, const std::vector
 }
 
 std::vector<Element*> XdmfDocument::find(const std::string& xpath, Element& from) const {
+  // Of several //, libxml2 takes minutes in a file of a few hundred elements.
+  if (xpath.find("//") != xpath.rfind("//"))
+    fail(path_, "has a path with several //, which is not read: " + escaped(xpath));
   const std::unique_ptr<xmlXPathContext, decltype(&xmlXPathFreeContext)> context(xmlXPathNewContext(document_.get()),
                                                                                  &xmlXPathFreeContext);
   context->node = &from;

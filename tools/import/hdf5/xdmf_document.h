@@ -31,7 +31,7 @@ class XdmfDocument {
   /// The elements in an element with one of the names. Elements that XInclude takes from elsewhere are among them.
   std::vector<XmlElement*> children(XmlElement& element, const std::vector<std::string>& names) const;
 
-  /// The elements that a path of XPath means. @param from  Where a relative path begins.
+  /// The elements that a path of XPath means, which has // once at most. @param from  Where a relative path begins.
   std::vector<XmlElement*> find(const std::string& xpath, XmlElement& from) const;
 
  private:
