@@ -1,11 +1,10 @@
-#include "tracing/paths/path_thinning.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include <Eigen/LU>
 
+#include "tracing/paths/path_thinning.h"
 #include "volumes/sampling/sample_tensors.h"
 
 namespace tensorray {
