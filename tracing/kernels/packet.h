@@ -11,7 +11,7 @@
 #include "tracing/kernels/packet_kernel.h"
 #include "tracing/steps/composition.h"
 #include "tracing/steps/step_lengths.h"
-#include "volumes/bricks/cubic_brick.h"
+#include "volumes/bricks/brick_layout.h"
 
 namespace tensorray::packets {
 
