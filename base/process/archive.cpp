@@ -1,6 +1,6 @@
 #include "base/process/archive.h"
 
-#include "base/text/copy_bytes.h"
+#include <cstring>
 
 namespace tensorray {
 
@@ -10,7 +10,7 @@ void Archive::copy(void* values, std::size_t size) {
     return;
   }
   require(size, 1);
-  copy_bytes(values, rest_.data(), size);
+  if (size > 0) std::memcpy(values, rest_.data(), size);  // Pointers of empty vectors may be null.
   rest_.remove_prefix(size);
 }
 

@@ -32,7 +32,6 @@
 #include "tools/import/lattice_files/lattice_files.h"
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk_formats/netcdf_end.h"
-#include "volumes/vdb/file_bytes.h"
 #include "volumes/vdb/vdb_tree_check.h"
 
 namespace tensorray::test {

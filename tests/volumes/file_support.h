@@ -2,7 +2,6 @@
 /// @file tests/volumes/file_support.h
 /// Temporary files, a tensor grid with everything that files must keep, and grids that OpenVDB itself writes.
 
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -13,7 +12,7 @@
 #include <unistd.h>
 
 #include "tests/volumes/file_size_limit.h"
-#include "volumes/grids/tensor_grid.h"
+#include "tests/volumes/grid_support.h"
 
 namespace tensorray {
 
@@ -41,13 +40,7 @@ inline void write_bytes(const std::filesystem::path& path, const std::string& by
 inline TensorGrid sparse_grid() {
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
   to_world.matrix() << 0.5, 0.1, 0, 3, -0.1, 0.25, 0.05, -7, 0, 0.3, 0.125, 11, 0, 0, 0, 1;
-  TensorGrid grid = dense_grid({Eigen::Vector3i(-11, -3, 5), Eigen::Vector3i(6, 12, 21)}, to_world,
-                               [](const Eigen::Vector3i& i) -> Eigen::Matrix3d {
-                                 return Eigen::Matrix3d::NullaryExpr([&](Eigen::Index r, Eigen::Index c) {
-                                   const double at = 2.1 * static_cast<double>(r) + 0.9 * static_cast<double>(c);
-                                   return std::sin(1.3 * i.x() + 0.7 * i.y() + 0.2 * i.z() + at);
-                                 });
-                               });
+  TensorGrid grid = dense_grid({Eigen::Vector3i(-11, -3, 5), Eigen::Vector3i(6, 12, 21)}, to_world, waves);
   for (TensorBlock& block : grid.blocks)
     for (int offset = 0; offset < TensorBlock::voxels; offset += 5) {
       block.active.reset(offset);
@@ -58,31 +51,29 @@ inline TensorGrid sparse_grid() {
   return grid;
 }
 
-inline void expect_same_blocks(const TensorGrid& a, const TensorGrid& b) {
-  ASSERT_EQ(a.blocks.size(), b.blocks.size());
-  for (std::size_t i = 0; i < a.blocks.size(); ++i) {
-    EXPECT_EQ(a.blocks[i].origin, b.blocks[i].origin);
-    EXPECT_EQ(a.blocks[i].active, b.blocks[i].active);
-    EXPECT_EQ(a.blocks[i].values, b.blocks[i].values);
-  }
-}
-
-inline const Eigen::Matrix3f* find(const TensorGrid& grid, const Eigen::Vector3i& index) {
-  for (const TensorBlock& block : grid.blocks) {
-    const Eigen::Vector3i p = index - block.origin;
-    if ((p.array() < 0).any() || (p.array() > 7).any()) continue;
-    const int offset = TensorBlock::offset(p.x(), p.y(), p.z());
-    return block.active[offset] ? &block.values[offset] : nullptr;
-  }
-  return nullptr;
-}
-
 template <class Grid>
 typename Grid::Ptr stock_grid(const std::string& name, typename Grid::ValueType background) {
   openvdb::initialize();
   const auto grid = Grid::create(background);
   grid->setName(name);
   return grid;
+}
+
+/// The rows of a tensor: `set(grid, row)` sets their voxels.
+template <class Set>
+openvdb::GridPtrVec stock_rows(const std::string& name, const Set& set) {
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    const auto grid = stock_grid<openvdb::Vec3SGrid>(name + "_row" + std::to_string(row), openvdb::Vec3s(0));
+    set(*grid, row);
+    rows.push_back(grid);
+  }
+  return rows;
+}
+
+/// Rows with one voxel, at the origin.
+inline openvdb::GridPtrVec voxel_rows(const std::string& name, float value = 1) {
+  return stock_rows(name, [&](auto& grid, int) { grid.tree().setValue({0, 0, 0}, openvdb::Vec3s(value)); });
 }
 
 inline void write_stock(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,

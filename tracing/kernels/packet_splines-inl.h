@@ -6,7 +6,7 @@ struct alignas(64) SplineWeights {
   float value[3][4][lanes], slope[3][4][lanes];
 };
 
-/// The weights of cubic_weights and, if `slopes`, of cubic_slopes.
+/// The weights of the cubic B-spline and, if `slopes`, their derivatives (CubicTaps of tensor_sampler.cpp).
 template <bool slopes>
 HWY_INLINE void find_weights(const Packet& packet, int at, SplineWeights& weights) {
   const F sixth = set(1.0f / 6), two_thirds = set(2.0f / 3), half = set(0.5f), one = set(1), two = set(2);

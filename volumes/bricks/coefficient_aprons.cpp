@@ -66,16 +66,13 @@ void for_parts(const Visit& visit) {
 template <class Brick, int components, int length>
 void copy_part_of(const float* block, const Vector3i& offset, const Vector3i& first, const Vector3i& end,
                   float* brick) {
-  // A linear brick of symmetric tensors has a gap after each third voxel.
-  constexpr int run = Brick::bending_offset(components, 3) == 3 * components ? length : 1;
   const Vector3i origin = TensorBlock::size * offset;
   for (int x = first.x(); x < end.x(); ++x)
     for (int y = first.y(); y < end.y(); ++y) {
       const int to = Brick::coefficient(x, y, first.z());
       const int from = CoefficientBlock::coefficient(x - origin.x(), y - origin.y(), first.z() - origin.z());
-      for (int z = 0; z < length; z += run)
-        std::memcpy(brick + Brick::bending_offset(components, to + z),
-                    block + CoefficientBlock::bending_offset(components, from + z), run * components * sizeof(float));
+      std::memcpy(brick + Brick::bending_offset(components, to),
+                  block + CoefficientBlock::bending_offset(components, from), length * components * sizeof(float));
       std::memcpy(brick + Brick::trailing_offset(components) + to,
                   block + CoefficientBlock::trailing_offset(components) + from, length * sizeof(float));
     }
@@ -110,16 +107,40 @@ void extrapolate(const Coefficients& field, const Vector3i& place, float* brick)
       }
 }
 
+/// The greatest squared Frobenius norm of the deviators of tensors, from T − T₂₂ I. NaN counts as zero.
+template <class Number>
+struct Deviators {
+  Number greatest = 0, squares = 0;  ///< Of a deviator, and of T − T₂₂ I.
+
+  /// @param stored  The stored components of T − T₂₂ I.
+  template <int components>
+  void add(const float* stored) {
+    const auto component = [&](int k) { return Number(stored[TensorBrick::stored_component(components, k)]); };
+    Number sum = 0;
+    for (int k = 0; k < TensorBrick::general; ++k) sum += component(k) * component(k);
+    const Number trace = component(0) + component(4);
+    squares = std::max(squares, sum);
+    greatest = std::max(greatest, sum - trace * trace / 3);
+  }
+
+  /// Whether no square underflows or overflows, nearly. In single precision the error is then below 2e-6, because the
+  /// trace takes at most two thirds of the squares away.
+  bool are_exact() const { return greatest > Number(min_square) && squares < Number(max_square); }
+
+  /// Rounded up, because interpolation may round to slightly more than the tensor of any voxel.
+  float bound() const { return static_cast<float>(std::sqrt(double{greatest}) * (1 + 1.2e-5)); }
+};
+
 /// TensorBrick::strongest: what is between voxels is a mean of coefficients, so that none of its deviators is greater
 /// than theirs.
 template <class Brick, int components>
 float strongest_of(const float* brick) {
   Deviators<float> single;
   for (int i = 0; i < Brick::coefficients; ++i) single.add<components>(brick + Brick::bending_offset(components, i));
-  if (single.are_exact()) return strongest_bound(single.greatest);
+  if (single.are_exact()) return single.bound();
   Deviators<double> exact;
   for (int i = 0; i < Brick::coefficients; ++i) exact.add<components>(brick + Brick::bending_offset(components, i));
-  return strongest_bound(exact.greatest);
+  return exact.bound();
 }
 
 /// @return TensorBrick::strongest.

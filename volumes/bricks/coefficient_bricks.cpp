@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <map>
+#include <tuple>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include "volumes/grids/page_memory.h"
 
@@ -13,7 +15,8 @@ namespace {
 using Eigen::AlignedBox3i;
 using Eigen::Vector3i;
 
-constexpr int block_edge = CubicBrick::cells;  // Of a block, in voxels.
+constexpr int block_edge = TensorBlock::size;
+static_assert(CoefficientBlock::width == block_edge, "a brick has the coefficients of a block, and some about it");
 
 int reach_of(const Interpolant& interpolant) {
   return interpolant.between == Interpolation::linear ? 0 : interpolant.border == Border::fade ? 1 : 2;
@@ -29,10 +32,25 @@ bool any_of(const VoxelMask& mask) {
 
 VoxelMask mask_of(const BlockShape& shape) {
   VoxelMask mask{};
+  if (shape.active.all()) mask.fill(0xff);
+  if (shape.active.all()) return mask;
   for (std::size_t row = 0; row < mask.size(); ++row)
     for (std::size_t z = 0; z < block_edge; ++z)
       mask[row] = static_cast<std::uint8_t>(mask[row] | (shape.active[row * block_edge + z] ? 1u << z : 0u));
   return mask;
+}
+
+/// Orders places by x, then y, then z, and removes those that are there twice.
+void sort_places(std::vector<Vector3i>& places) {
+  tbb::parallel_sort(places.begin(), places.end(), [](const Vector3i& a, const Vector3i& b) {
+    return std::make_tuple(a.x(), a.y(), a.z()) < std::make_tuple(b.x(), b.y(), b.z());
+  });
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+}
+
+/// The range of bricks that hold the cells between the voxels of a box. An axis with a single voxel has one cell.
+AlignedBox3i bricks_with_cells(const AlignedBox3i& voxels) {
+  return {place_of(voxels.min()), place_of((voxels.max().array() - 1).matrix().cwiseMax(voxels.min()))};
 }
 
 /// The places of the blocks, and all about them.
@@ -126,6 +144,12 @@ std::size_t max_places_of_slab() {
 
 }  // namespace
 
+BlockTable::BlockTable(const std::vector<BlockShape>& all) : shapes(all) {
+  places.reserve(shapes.size());
+  for (const BlockShape& shape : shapes) places.emplace_back(shape.origin / block_edge);
+  index = BrickIndex(places);
+}
+
 std::vector<PlaceNumbers> slabs_of(const std::vector<Vector3i>& places, std::size_t most) {
   std::map<int, PlaceNumbers> by_x;
   for (std::uint32_t i = 0; i < places.size(); ++i) by_x[places[i].x()].push_back(i);
@@ -140,7 +164,8 @@ std::vector<PlaceNumbers> slabs_of(const std::vector<Vector3i>& places, std::siz
 
 CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i& extent,
                                      const Interpolant& interpolant) {
-  const std::vector<Vector3i> candidates = places_about(table);
+  const int reach = reach_of(interpolant);
+  const std::vector<Vector3i> candidates = reach == 0 ? table.places : places_about(table);
   const BrickIndex found(candidates);
   std::vector<VoxelMask> active(candidates.size()), filled(candidates.size());
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
@@ -148,15 +173,17 @@ CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i
     if (block != BrickIndex::missing) active[i] = mask_of(table.shapes[block]);
   });
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    filled[i] = active[i];
+    if (reach == 0) return;
     WideMask wide;
     for (int n = 0; n < neighbour_count; ++n)
       if (const std::uint32_t at = found.find(candidates[i] + neighbour(n)); at != BrickIndex::missing)
         wide.add(active[at], neighbour(n));
-    filled[i] = wide.spread(reach_of(interpolant));
+    filled[i] = wide.spread(reach);
     cut(filled[i], candidates[i], extent);
   });
 
-  const AlignedBox3i with_cells = bricks_of(extent);
+  const AlignedBox3i with_cells = bricks_with_cells(extent);
   CoefficientBricks result;
   std::vector<Vector3i> others;
   for (std::size_t i = 0; i < candidates.size(); ++i) {

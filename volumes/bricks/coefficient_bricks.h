@@ -13,12 +13,21 @@
 #include <Eigen/Geometry>
 
 #include "volumes/bricks/brick_index.h"
-#include "volumes/bricks/brick_making.h"
-#include "volumes/bricks/cubic_brick.h"
-#include "volumes/grids/brick_memory.h"
+#include "volumes/bricks/brick_layout.h"
+#include "volumes/bricks/brick_memory.h"
 #include "volumes/grids/interpolation.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
+
+/// Finds blocks by their places (index of the first voxel / 8). Does not own the shapes.
+struct BlockTable {
+  explicit BlockTable(const std::vector<BlockShape>& shapes);
+
+  const std::vector<BlockShape>& shapes;
+  std::vector<Eigen::Vector3i> places;
+  BrickIndex index;
+};
 
 /// Which of a block's 8³ voxels: a row along z is a byte, whose bit z is voxel (x, y, z); rows are at 8 x + y.
 using VoxelMask = std::array<std::uint8_t, TensorBlock::size * TensorBlock::size>;

@@ -3,9 +3,11 @@
 /// From the voxels of a field to the coefficients that its cells need.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "volumes/bricks/coefficient_bricks.h"
+#include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
 
@@ -14,6 +16,13 @@ BrickMemory brick_memory(const CoefficientBricks& bricks, Interpolation between,
 
 /// The blocks within this memory, which they keep.
 BrickMemory blocks_within(const BrickMemory& memory, const CoefficientBricks& bricks);
+
+/// Outside this range, sums of squares in single precision may be wrong: a term may underflow or overflow.
+constexpr float min_square = 1e-25f, max_square = 1e30f;
+
+/// Copies the voxels of a block to the layout of CoefficientBlock. @return the greatest squared norm of a tensor;
+/// nothing, if the copy is of symmetric tensors and the block is not: T = Tᵀ in all voxels, bit for bit.
+std::optional<double> place_values(const TensorBlock& block, int components, float* values);
 
 /// Continues the values of a cubic field's active voxels to the others that have coefficients, as the mean of all axes
 /// that lead to a voxel: with `extend` by a line through two voxels, or the value of a single one; with `fade` a fifth

@@ -1,15 +1,18 @@
 #include "volumes/bricks/tensor_field.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include "base/geometry/box.h"
-#include "volumes/bricks/brick_making.h"
+#include "volumes/bricks/brick_layout.h"
 #include "volumes/bricks/coefficients.h"
-#include "volumes/bricks/cubic_brick.h"
 
 namespace tensorray {
 namespace {
@@ -29,6 +32,28 @@ Eigen::AlignedBox3d extent_of(const Eigen::AlignedBox3i& active) {
   return extent;
 }
 
+/// Reads each block once, on all threads, and places its values. @param norms  Get the greatest squared norms.
+/// @return false if a block is not symmetric, as those of `blocks` must be.
+bool place_blocks(const BlockSource& source, const BlockTable& table, const CoefficientBricks& bricks,
+                  const BrickMemory& blocks, std::vector<double>& norms) {
+  constexpr std::size_t grain = 16;  // Number of blocks that a thread places in a row.
+  std::atomic<bool> fits{true};
+  const tbb::blocked_range<std::size_t> all(0, source.shapes.size(), grain);
+  tbb::parallel_for(all, [&](const tbb::blocked_range<std::size_t>& range) {
+    TensorBlock block;
+    for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
+      read_block(source, i, block);
+      const std::uint32_t at = bricks.index.find(table.places[i]);
+      if (at == BrickIndex::missing) continue;  // It has no active voxel.
+      if (const auto norm = place_values(block, blocks.components, blocks.brick(at)))
+        norms[i] = *norm;
+      else
+        fits = false;
+    }
+  });
+  return fits;
+}
+
 }  // namespace
 
 const float* const TensorField::zeros = zero_brick.floats;
@@ -36,7 +61,7 @@ const float* const TensorField::zeros = zero_brick.floats;
 Eigen::Matrix3d TensorBrick::tensor(int voxel) const {
   Eigen::Matrix3d T;
   for (int i = 0; i < general; ++i)
-    T.data()[i] = double{bending[bending_offset(components, voxel) + stored_component(components, i)]};
+    T.data()[i] = double{bending[LinearBrick::bending_offset(components, voxel) + stored_component(components, i)]};
   T(2, 2) = trailing[voxel];
   T(0, 0) += T(2, 2);
   T(1, 1) += T(2, 2);
@@ -59,19 +84,13 @@ TensorField::TensorField(const BlockSource& source, const Interpolant& interpola
   const BlockTable table(source.shapes);
   const CoefficientBricks bricks = coefficient_bricks(table, active, interpolant);
   std::vector<double> norms(table.shapes.size());
-  const auto place = [&](std::size_t i, const TensorBlock& block, const BrickMemory& blocks) {
-    const std::uint32_t at = bricks.index.find(table.places[i]);
-    if (at == BrickIndex::missing) return true;  // It has no active voxel.
-    const std::optional<double> norm = place_values(block, blocks.components, blocks.brick(at));
-    if (norm) norms[i] = *norm;
-    return norm.has_value();
-  };
-  const auto make = [&](bool symmetric) {
-    memory_ = {};
-    memory_ = brick_memory(bricks, interpolant.between, symmetric ? TensorBrick::symmetric : TensorBrick::general);
-    return blocks_within(memory_, bricks);
-  };
-  const BrickMemory blocks = place_blocks(source, make, place);
+  BrickMemory blocks;
+  for (const int components : {TensorBrick::symmetric, TensorBrick::general}) {  // Any tensors fit the second time.
+    blocks = memory_ = {};
+    memory_ = brick_memory(bricks, interpolant.between, components);
+    blocks = blocks_within(memory_, bricks);
+    if (place_blocks(source, table, bricks, blocks, norms)) break;
+  }
   const Coefficients coefficients{bricks, active, interpolant, blocks};
   continue_values(coefficients);
   const std::vector<float> strongest = make_coefficients(coefficients, memory_);
@@ -99,7 +118,7 @@ TensorField::TensorField(FieldParts parts)
 
 void TensorField::set_trailing_offset() {
   trailing_offset_ = static_cast<std::size_t>(is_cubic() ? CubicBrick::trailing_offset(memory_.components)
-                                                         : TensorBrick::trailing_offset(memory_.components));
+                                                         : LinearBrick::trailing_offset(memory_.components));
 }
 
 void TensorField::keep_with_bricks(std::shared_ptr<const void> other) {

@@ -9,43 +9,33 @@
 #include <Eigen/Geometry>
 
 #include "volumes/bricks/brick_index.h"
+#include "volumes/bricks/brick_memory.h"
 #include "volumes/grids/block_source.h"
-#include "volumes/grids/brick_memory.h"
 #include "volumes/grids/interpolation.h"
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 
-/// 8³ cells, with the far apron that trilinear interpolation needs: 9³ voxels. All bricks without an active voxel share
-/// one brick of zeros. (A cubic field's bricks hold coefficients instead: see cubic_brick.h.)
+/// 8³ cells, with the coefficients that interpolation needs in them (brick_layout.h): of a linear field the tensors at
+/// 9³ voxels, of a cubic one those of a B-spline. All bricks without an active voxel share one brick of zeros.
 ///
 /// A tensor T is stored in two parts. T − T₂₂ I bends light as T does, because a multiple of the identity bends nothing
 /// (Zheng and Pang 2003, Eq. 5). Its last component is zero, so that eight floats suffice. If T = Tᵀ in all voxels of
 /// the field, bit for bit, five of them are stored: those on and below the diagonal. T₂₂ is stored separately.
 struct TensorBrick {
   static constexpr int cells = 8;
-  static constexpr int width = cells + 1;  ///< Voxels along an edge, with the apron.
-  static constexpr int voxels = width * width * width;
 
-  /// Numbers of components of T − T₂₂ I that voxels store: of any tensor, and of a symmetric one.
+  /// Numbers of components of T − T₂₂ I that are stored: of any tensor, and of a symmetric one.
   static constexpr int general = 8, symmetric = 5;
-
-  static constexpr int voxel(int x, int y, int z) { return (x * width + y) * width + z; }
 
   /// The number of the stored component that is component i, column by column, of T − T₂₂ I.
   static constexpr int stored_component(int components, int i) {
     constexpr int of_symmetric[] = {0, 1, 2, 1, 3, 4, 2, 4};
     return components == symmetric ? of_symmetric[i] : i;
   }
-  /// Offset of a voxel's components from `bending`, in floats.
-  static constexpr int bending_offset(int components, int voxel) { return voxel * components; }
-  /// Offset of `trailing` from `bending`, in floats.
-  static constexpr int trailing_offset(int components) { return bending_offset(components, voxels); }
-  /// Number of floats of a brick, rounded up to whole cache lines.
-  static constexpr int stored_floats(int components) { return (trailing_offset(components) + voxels + 15) / 16 * 16; }
 
-  const float* bending;   ///< T − T₂₂ I column by column, `components` per voxel at its `bending_offset`.
-  const float* trailing;  ///< One float per voxel: T₂₂.
+  const float* bending;   ///< T − T₂₂ I column by column: `components` a coefficient.
+  const float* trailing;  ///< T₂₂: one float a coefficient.
   float strongest;        ///< Upper bound in the brick of the Frobenius norm of the deviator, T − ⅓ tr(T) I.
   int components;         ///< `general` or `symmetric`; the same in all bricks of a field.
 

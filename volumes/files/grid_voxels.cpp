@@ -2,20 +2,45 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <istream>
 #include <new>
 #include <streambuf>
+#include <string>
 
 #include <openvdb/io/Compression.h>
 #include <tbb/parallel_for.h>
 
-#include "volumes/vdb/voxel_extent.h"
+#include "base/errors.h"
+#include "base/process/process_limits.h"
+#include "base/text/text.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
 
 /// More blocks than fit in any machine's memory. An active tile at the root of a tree would expand to as many.
 constexpr std::size_t max_block_count = std::size_t{1} << 25;
+
+/// Voxels may have indices from −max_index to max_index along each axis. Then sizes, and the indices of neighbours, are
+/// integers of 32 bits. 2²⁹ voxels of a micrometre are half a kilometre.
+constexpr std::int32_t max_index = 1 << 29;
+
+void require_extent(const std::filesystem::path& path, const Eigen::Vector3i& min, const Eigen::Vector3i& max) {
+  if ((min.array() >= -max_index).all() && (max.array() <= max_index).all()) return;
+  fail(path, "has voxels whose indices are beyond " + std::to_string(max_index) +
+                 "; the file is damaged, or its grid has to be moved to the origin");
+}
+
+/// Checks that blocks fit in the memory that there is. A bound (--memory) is checked elsewhere.
+void require_memory(const std::filesystem::path& path, std::size_t blocks, std::size_t block_bytes) {
+  if (memory_bound()) return;
+  const double bytes = static_cast<double>(blocks) * static_cast<double>(block_bytes);
+  const MemoryLimit limit = memory_limit();
+  if (bytes > limit.bytes)
+    fail(path, "its active voxels need " + bytes_text(bytes) + ", more than " + limit.cause + ", " +
+                   bytes_text(limit.bytes) + "; resample it more coarsely, or give --memory");
+}
 
 /// Calls `visit(tree)` with the grid's tree as its actual type.
 template <class Visit>

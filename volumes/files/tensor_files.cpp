@@ -13,7 +13,6 @@
 #include "base/text/text.h"
 #include "volumes/files/grid_voxels.h"
 #include "volumes/vdb/vdb_transform.h"
-#include "volumes/vdb/voxel_extent.h"
 
 namespace tensorray {
 namespace {

@@ -14,7 +14,7 @@
 
 #include <Eigen/Geometry>
 
-#include "volumes/grids/block_memory.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 

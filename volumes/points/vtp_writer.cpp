@@ -1,4 +1,4 @@
-#include "volumes/points/vtp_writer.h"
+// `write_vtp` of vtk_files.h.
 
 #include <algorithm>
 #include <array>
@@ -6,15 +6,16 @@
 #include <cstdint>
 #include <cstring>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 #include <system_error>
 
 #include <fcntl.h>
 #include <tbb/parallel_for.h>
 
+#include "base/errors.h"
 #include "base/files/descriptor.h"
 #include "base/text/byte_order.h"
+#include "volumes/points/vtk_files.h"
 
 namespace tensorray {
 namespace {
@@ -54,8 +55,9 @@ void encode_base64(const char* bytes, std::size_t count, std::string& text) {
 
 class VtpWriter {
  public:
-  explicit VtpWriter(const std::filesystem::path& path) : file_(open_file(path, O_WRONLY | O_CREAT | O_TRUNC)) {
-    if (!file_.is_open()) fail();
+  explicit VtpWriter(const std::filesystem::path& path)
+      : path_(path), file_(open_file(path, O_WRONLY | O_CREAT | O_TRUNC)) {
+    if (!file_.is_open()) fail_to_write();
   }
 
   void text(const std::string& text) {
@@ -81,16 +83,19 @@ class VtpWriter {
   }
 
   void close() {
-    if (!file_.close()) fail();
+    if (!file_.close()) fail_to_write();
   }
 
  private:
-  [[noreturn]] static void fail() { throw std::runtime_error(std::generic_category().message(errno)); }
-
-  void write(std::size_t at, const std::string& text) const {
-    if (!write_whole_at(file_.get(), text, at)) fail();
+  [[noreturn]] void fail_to_write() const {
+    fail(path_, "cannot be written: " + std::generic_category().message(errno));
   }
 
+  void write(std::size_t at, const std::string& text) const {
+    if (!write_whole_at(file_.get(), text, at)) fail_to_write();
+  }
+
+  std::filesystem::path path_;
   Descriptor file_;
   std::size_t end_ = 0;
 };
@@ -118,12 +123,27 @@ void write_numbers(VtpWriter& file, const std::string& name, const Number* numbe
   file.array("DataArray", attributes, numbers, count * sizeof(Number));
 }
 
-void write_array(VtpWriter& file, const std::string& name, const DataView& view) {
-  std::visit([&](const auto& numbers) { write_numbers(file, name, numbers.data, numbers.size, view.components); },
-             view.values);
+void write_array(VtpWriter& file, const std::string& name, const std::vector<float>& values) {
+  write_numbers(file, name, values.data(), values.size(), 1);
 }
 
-void write_texts(VtpWriter& file, const std::string& name, const Texts& texts) {
+template <class Number>
+void write_array(VtpWriter& file, const std::string& name, const std::vector<Eigen::Matrix<Number, 3, 1>>& vectors) {
+  static_assert(sizeof(Eigen::Matrix<Number, 3, 1>) == 3 * sizeof(Number), "vectors are contiguous");
+  write_numbers(file, name, reinterpret_cast<const Number*>(vectors.data()), 3 * vectors.size(), 3);
+}
+
+void write_array(VtpWriter& file, const std::string& name, const DataArray& array) {
+  std::visit([&](const auto& values) { write_numbers(file, name, values.data(), values.size(), array.components); },
+             array.values);
+}
+
+template <class Values>
+void write_arrays(VtpWriter& file, const std::map<std::string, Values>& arrays) {
+  for (const auto& [name, values] : arrays) write_array(file, name, values);
+}
+
+void write_texts(VtpWriter& file, const std::string& name, const std::vector<std::string>& texts) {
   std::string bytes;
   for (const std::string& text : texts) bytes.append(text.c_str(), text.size() + 1);
   file.array("Array",
@@ -142,50 +162,69 @@ void write_cells(VtpWriter& file, const std::string& element, std::size_t points
   file.text("</" + element + ">\n");
 }
 
-std::size_t value_count(const DataView& view) {
-  return std::visit([&](const auto& numbers) { return numbers.size / static_cast<std::size_t>(view.components); },
-                    view.values);
+/// Names what ParaView shows at first, and what its filters of vectors and tensors take.
+template <class... Arrays>
+std::string active_arrays(const Arrays&... arrays) {
+  const auto attribute = [&](const char* kind, const char* name) {
+    return (arrays.count(name) + ...) > 0 ? std::string(" ") + kind + "=\"" + name + "\"" : "";
+  };
+  const std::string force = attribute("Scalars", "force");
+  return attribute("Vectors", "direction") + attribute("Tensors", "tensor") +
+         (force.empty() ? attribute("Scalars", "wavelength") : force);
 }
 
-/// Names what ParaView shows at first, and what its filters of vectors and tensors take.
-std::string active_arrays(const PolyDataView& data) {
-  std::string attributes, scalars;
-  for (const auto& [name, values] : data.point_data) {
-    if (name == "force" || (name == "wavelength" && scalars.empty())) scalars = name;
-    if (name == "direction") attributes += " Vectors=\"direction\"";
-    if (name == "tensor") attributes += " Tensors=\"tensor\"";
-  }
-  return attributes + (scalars.empty() ? "" : " Scalars=\"" + scalars + "\"");
+/// @param element  Of the cells: "Lines" or "Verts". @param ends  Of each: the number of points up to its end.
+/// @param write_notes, write_points, write_lines  Write the arrays of the whole, of points and of lines.
+template <class Points, class WriteTexts, class WritePoints, class WriteLines>
+void write_poly_data(const std::filesystem::path& path, const Points& points, const std::string& element,
+                     const std::vector<std::int64_t>& ends, const std::string& active, const WriteTexts& write_notes,
+                     const WritePoints& write_points, const WriteLines& write_lines) {
+  const auto count = [&](const char* of) { return "\"" + std::to_string(of == element ? ends.size() : 0) + "\""; };
+  const std::string order = host_byte_order() == ByteOrder::little ? "LittleEndian" : "BigEndian";
+  VtpWriter file(path);
+  file.text("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"" + order +
+            "\" header_type=\"UInt64\">\n<PolyData>\n<FieldData>\n");
+  write_notes(file);
+  file.text("</FieldData>\n<Piece NumberOfPoints=\"" + std::to_string(points.size()) +
+            "\" NumberOfVerts=" + count("Verts") + " NumberOfLines=" + count("Lines") +
+            " NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n" + "<PointData" + active + ">\n");
+  write_points(file);
+  file.text("</PointData>\n<CellData>\n");
+  write_lines(file);
+  file.text("</CellData>\n<Points>\n");
+  write_array(file, "Points", points);
+  file.text("</Points>\n");
+  write_cells(file, element, points.size(), ends);
+  file.text("</Piece>\n</PolyData>\n</VTKFile>\n");
+  file.close();
 }
 
 }  // namespace
 
-void write_vtp_file(const std::filesystem::path& path, const PolyDataView& data) {
-  const std::size_t points = value_count(data.points);
-  std::vector<std::int64_t> ends(data.line_ends ? data.line_ends->size() : points);
-  if (data.line_ends)
-    std::copy(data.line_ends->begin(), data.line_ends->end(), ends.begin());
-  else
-    std::iota(ends.begin(), ends.end(), std::int64_t{1});
-  const auto count = [&](bool here) { return "\"" + std::to_string(here ? ends.size() : 0) + "\""; };
-  const std::string order = host_byte_order() == ByteOrder::little ? "LittleEndian" : "BigEndian";
+void write_vtp(const std::filesystem::path& path, const PointCloud& cloud) {
+  std::vector<std::int64_t> ends(cloud.positions.size());
+  std::iota(ends.begin(), ends.end(), std::int64_t{1});
+  write_poly_data(
+      path, cloud.positions, "Verts", ends, active_arrays(cloud.scalars, cloud.vectors),
+      [&](VtpWriter& file) {
+        for (const auto& [key, value] : cloud.metadata) write_texts(file, key, {value});
+      },
+      [&](VtpWriter& file) {
+        write_arrays(file, cloud.scalars);
+        write_arrays(file, cloud.vectors);
+      },
+      [](VtpWriter&) {});
+}
 
-  VtpWriter file(path);
-  file.text("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"" + order +
-            "\" header_type=\"UInt64\">\n<PolyData>\n<FieldData>\n");
-  for (const auto& [name, texts] : data.texts) write_texts(file, name, texts);
-  file.text("</FieldData>\n<Piece NumberOfPoints=\"" + std::to_string(points) +
-            "\" NumberOfVerts=" + count(!data.line_ends) + " NumberOfLines=" + count(data.line_ends != nullptr) +
-            " NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n<PointData" + active_arrays(data) + ">\n");
-  for (const auto& [name, values] : data.point_data) write_array(file, name, values);
-  file.text("</PointData>\n<CellData>\n");
-  for (const auto& [name, values] : data.line_data) write_array(file, name, values);
-  file.text("</CellData>\n<Points>\n");
-  write_array(file, "Points", data.points);
-  file.text("</Points>\n");
-  write_cells(file, data.line_ends ? "Lines" : "Verts", points, ends);
-  file.text("</Piece>\n</PolyData>\n</VTKFile>\n");
-  file.close();
+void write_vtp(const std::filesystem::path& path, const PolylineData& lines) {
+  const std::vector<std::int64_t> ends(lines.line_ends.begin(), lines.line_ends.end());
+  write_poly_data(
+      path, lines.points, "Lines", ends, active_arrays(lines.point_data),
+      [&](VtpWriter& file) {
+        for (const auto& [name, texts] : lines.texts) write_texts(file, name, texts);
+      },
+      [&](VtpWriter& file) { write_arrays(file, lines.point_data); },
+      [&](VtpWriter& file) { write_arrays(file, lines.line_data); });
 }
 
 }  // namespace tensorray

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "volumes/bricks/cubic_brick.h"
+#include "volumes/bricks/brick_layout.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 // The code before HWY_AFTER_NAMESPACE is compiled once for each kind of processor. It calls no inline functions of
@@ -82,7 +82,7 @@ HWY_INLINE void store_components(V values, std::size_t c, std::size_t p, float (
   hn::Store(values, hn::DFromV<V>(), components[c / 4] + 4 * p + c % 4);
 }
 
-/// The weights of the cubic B-spline along an axis (see cubic_brick.h).
+/// The weights of the cubic B-spline along an axis (as in tensor_sampler.cpp).
 HWY_INLINE void spline_weights(float t, float (&weights)[4]) {
   const float u = 1 - t;
   weights[0] = u * u * u / 6;

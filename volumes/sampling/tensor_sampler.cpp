@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "volumes/bricks/cubic_brick.h"
+#include "volumes/bricks/brick_layout.h"
 
 namespace tensorray {
 
@@ -28,7 +28,7 @@ int TensorSampler::locate(const Eigen::Vector3d& world, Eigen::Vector3d& fractio
   }
   cell -= TensorBrick::cells * at;
   if (field_->is_cubic()) return CubicBrick::coefficient(cell.x() - 1, cell.y() - 1, cell.z() - 1);
-  return TensorBrick::voxel(cell.x(), cell.y(), cell.z());
+  return LinearBrick::coefficient(cell.x(), cell.y(), cell.z());
 }
 
 namespace {
@@ -40,7 +40,7 @@ struct Slopes {
 };
 
 /// The numbers of a brick that a point of a linear field depends on: the voxels of its cell, in all 2³.
-struct LinearTaps : TensorBrick {
+struct LinearTaps : LinearBrick {
   static constexpr int taps = 2;
   static void find_weights(double t, double (&value)[2], double (&slope)[2]) {
     value[0] = 1 - t;
@@ -54,8 +54,15 @@ struct LinearTaps : TensorBrick {
 struct CubicTaps : CubicBrick {
   static constexpr int taps = 4;
   static void find_weights(double t, double (&value)[4], double (&slope)[4]) {
-    cubic_weights(t, value);
-    cubic_slopes(t, slope);
+    const double u = 1 - t;
+    value[0] = u * u * u / 6;
+    value[1] = 2.0 / 3 - t * t * (2 - t) / 2;
+    value[2] = 2.0 / 3 - u * u * (2 - u) / 2;
+    value[3] = t * t * t / 6;
+    slope[0] = -u * u / 2;
+    slope[1] = t * (3 * t - 4) / 2;
+    slope[2] = -u * (3 * u - 4) / 2;
+    slope[3] = t * t / 2;
   }
 };
 

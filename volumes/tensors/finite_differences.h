@@ -8,7 +8,6 @@
 
 #include <Eigen/Core>
 
-#include "volumes/grids/block_memory.h"
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {

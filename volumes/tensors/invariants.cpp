@@ -6,7 +6,6 @@
 #include <limits>
 #include <stdexcept>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 

@@ -12,6 +12,7 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
+#include "volumes/bricks/brick_layout.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
@@ -54,7 +55,7 @@ void add_brick(const TensorField& field, const Vector3i& place, const Voxels& bo
       for (int z = shared.min().z(); z <= shared.max().z(); ++z) {
         const Vector3i voxel(x, y, z), p = voxel - origin;
         const Eigen::Matrix3d tensor = field.is_cubic() ? sampler.at(field.to_world() * voxel.cast<double>())
-                                                        : brick.tensor(TensorBrick::voxel(p.x(), p.y(), p.z()));
+                                                        : brick.tensor(LinearBrick::coefficient(p.x(), p.y(), p.z()));
         set_with_margin(grid, box, voxel, as_float(invariant(which, tensor)));
       }
 }

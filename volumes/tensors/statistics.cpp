@@ -5,7 +5,6 @@
 #include <limits>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
@@ -19,8 +18,7 @@ namespace {
 constexpr double min_part = 1e-6;
 
 double spectral_norm(const Eigen::Matrix3d& tensor) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tensor.transpose() * tensor, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
+  return std::sqrt(std::max(0.0, eigenvalues(tensor.transpose() * tensor)[0].real()));
 }
 
 /// What is gathered from the voxels of one block.

@@ -35,7 +35,7 @@ constexpr std::size_t stream_buffer = 1 << 20;
 constexpr std::streamoff version_offset = 8, tag_offset = 21;
 
 [[noreturn]] void fail_damaged(const std::filesystem::path& path, const std::string& how) {
-  fail(path, "the file is truncated or damaged" + how + "; copy or write it again");
+  fail(path, "is truncated or damaged" + how + "; copy or write it again");
 }
 
 StoredTree stored_tree(const openvdb::io::GridDescriptor& descriptor, std::uint32_t compression) {
@@ -178,8 +178,8 @@ class Reader : private openvdb::io::Archive {
     readGridCompression(in_);
     VdbGrid read;
     if (!value_size(descriptor.gridType()))
-      fail(path_,
-           "grid " + name_of(descriptor) + " is a " + descriptor.gridType() + ", which cannot be read; leave it out");
+      fail(path_, "grid " + name_of(descriptor) + " has the type " + descriptor.gridType() +
+                      ", which this program cannot read; write the file without it");
     read.grid = openvdb::GridBase::createGrid(descriptor.gridType());
     static_cast<openvdb::MetaMap&>(*read.grid) = read_metadata();
     read.grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());  // Whatever its metadata say.

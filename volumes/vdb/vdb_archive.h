@@ -19,7 +19,6 @@
 #include <Eigen/Geometry>
 #include <openvdb/openvdb.h>
 
-#include "volumes/vdb/file_bytes.h"
 #include "volumes/vdb/vdb_tree_check.h"
 
 namespace tensorray {

@@ -1,8 +1,13 @@
 #include "volumes/vdb/vdb_tree_check.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <map>
+#include <system_error>
 
+#include <fcntl.h>
+
+#include "base/errors.h"
 #include "base/text/byte_order.h"
 
 namespace tensorray {
@@ -24,6 +29,43 @@ enum NodeFlag : int {
 constexpr std::size_t window = 1 << 16;  // Bytes that are read at once.
 
 constexpr std::int64_t max_chunk = 1 << 20;  // More than leaves have.
+
+/// Reads a file from front to back, and ahead. (Streams copy what they skip.)
+class ByteCursor {
+ public:
+  ByteCursor(const FileBytes& file, std::int64_t at) : file_(file), at_(at) {}
+
+  std::int64_t at() const { return at_; }
+
+  /// @throw FormatError if the file does not have them.
+  void skip(std::int64_t bytes) {
+    if (bytes < 0 || bytes > file_.size() - at_) throw FormatError();
+    at_ += bytes;
+  }
+
+  /// The next `count` bytes, which stay valid until the next call. @throw FormatError as above.
+  const char* next(std::size_t count) {
+    const auto wanted = static_cast<std::int64_t>(count);
+    if (wanted > file_.size() - at_) throw FormatError();
+    if (at_ < first_ || at_ + wanted > first_ + static_cast<std::int64_t>(bytes_.size())) {
+      first_ = at_;
+      bytes_.resize(std::min(std::max(count, window), static_cast<std::size_t>(file_.size() - at_)));
+      if (!file_.read(first_, bytes_.data(), bytes_.size())) throw FormatError();
+    }
+    at_ += wanted;
+    return bytes_.data() + (at_ - wanted - first_);
+  }
+
+  template <class Number>
+  Number number() {
+    return read_number<Number>(next(sizeof(Number)), ByteOrder::little);
+  }
+
+ private:
+  const FileBytes& file_;
+  std::int64_t at_, first_ = 0;  ///< The next byte, and that of `bytes_`.
+  std::vector<char> bytes_;
+};
 
 /// One bit for each value of a node.
 template <std::size_t Count>
@@ -59,7 +101,7 @@ bool blosc_fits(const char* header, std::int64_t stored, std::int64_t expected) 
 class TreeParser {
  public:
   TreeParser(const FileBytes& file, std::int64_t at, const StoredTree& tree, const ValueSize& size)
-      : in_(file, at, window), tree_(tree), size_(size) {}
+      : in_(file, at), tree_(tree), size_(size) {}
 
   std::vector<StoredLeaf> leaves() {
     std::vector<StoredLeaf> leaves(parse_topology());
@@ -138,6 +180,15 @@ class TreeParser {
 };
 
 }  // namespace
+
+FileBytes::FileBytes(const std::filesystem::path& path) : file_(open_file(path, O_RDONLY)) {
+  if (!file_.is_open()) fail(path, "cannot be opened: " + std::generic_category().message(errno) + "; check the path");
+  size_ = static_cast<std::int64_t>(std::filesystem::file_size(path));
+}
+
+bool FileBytes::read(std::int64_t at, void* bytes, std::size_t count) const {
+  return read_whole_at(file_.get(), bytes, count, static_cast<std::uint64_t>(at));
+}
 
 std::optional<ValueSize> value_size(const std::string& type) {
   static const std::map<std::string, ValueSize> sizes{{"Tree_float_5_4_3", {4, 2}},

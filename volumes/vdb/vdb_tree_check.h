@@ -6,14 +6,34 @@
 
 #include <bitset>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/files/descriptor.h"
 #include "volumes/grids/tensor_grid.h"
-#include "volumes/vdb/file_bytes.h"
 
 namespace tensorray {
+
+/// An open file. Any number of threads may read it at once.
+class FileBytes {
+ public:
+  /// @throw std::runtime_error naming the file and the reason.
+  explicit FileBytes(const std::filesystem::path& path);
+
+  std::int64_t size() const { return size_; }
+
+  /// Copies `count` bytes from position `at` on. @return false if the file does not have them, or cannot be read.
+  bool read(std::int64_t at, void* bytes, std::size_t count) const;
+
+ private:
+  Descriptor file_;
+  std::int64_t size_ = 0;
+};
+
+/// Thrown where a file has less bytes than are needed, or lengths in it do not fit.
+struct FormatError {};
 
 /// How a file stores a tree.
 struct StoredTree {

@@ -22,7 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 std::string text_of(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -102,17 +101,6 @@ TEST_F(OutputFileTest, LeavesTheOldFileUntilCommitted) {
   EXPECT_EQ(names(), std::vector<std::string>{"a.png"});
 }
 
-TEST_F(OutputFileTest, IsRemovedWhenTheWorkThrows) {
-  EXPECT_THROW(
-      {
-        OutputFile file(folder_ / "a.png");
-        write(file.path(), "half");
-        throw std::runtime_error("the work failed");
-      },
-      std::runtime_error);
-  EXPECT_THAT(names(), IsEmpty());
-}
-
 TEST_F(OutputFileTest, TwoOfOneTargetDoNotMeet) {
   OutputFile first(folder_ / "a.png"), second(folder_ / "a.png");
   EXPECT_NE(first.path(), second.path());
@@ -128,15 +116,6 @@ TEST_F(OutputFileTest, Moves) {
   commit_all(files);
   EXPECT_EQ(names(), std::vector<std::string>{"b.png"});
   EXPECT_THROW(files[0].commit(), std::logic_error);
-}
-
-TEST_F(OutputFileTest, KeepsPermissions) {
-  write(folder_ / "a.png", "old");
-  fs::permissions(folder_ / "a.png", fs::perms::owner_read | fs::perms::owner_write | fs::perms::others_read);
-  OutputFile file(folder_ / "a.png");
-  file.commit();
-  EXPECT_EQ(fs::status(folder_ / "a.png").permissions(),
-            fs::perms::owner_read | fs::perms::owner_write | fs::perms::others_read);
 }
 
 TEST_F(OutputFileTest, NewFilesHaveThePermissionsOfTheMask) {
@@ -160,14 +139,6 @@ TEST_F(OutputFileTest, FollowsLinks) {
   }
   EXPECT_EQ(text_of(folder_ / "elsewhere" / "real.png"), "new");
   EXPECT_EQ(text_of(folder_ / "elsewhere" / "none.png"), "new");
-}
-
-TEST_F(OutputFileTest, CopiesIntoDevices) {
-  OutputFile file("/dev/null");
-  write(file.path(), "anything");
-  file.commit();
-  EXPECT_TRUE(fs::is_character_file("/dev/null"));
-  EXPECT_FALSE(fs::exists(file.path()));
 }
 
 TEST_F(OutputFileTest, CopiesIntoPipes) {

@@ -1,7 +1,6 @@
 #include "base/process/child_program.h"
 
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -9,7 +8,6 @@
 #include <string>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "base/process/progress.h"
 
@@ -58,23 +56,6 @@ TEST(ChildProgram, SharesAFile) {
   const ProgramEnd end = run_shell("read text < " + file + "; echo \"$text and back\" > " + file, shared);
   EXPECT_EQ(end.status, 0) << end.error;
   EXPECT_EQ(text_of(shared.path()), "there and back\n");
-}
-
-TEST(ChildProgram, UnnamedFilesLeaveNothing) {
-  const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / ("tensorray_unnamed_" + std::to_string(getpid()));
-  std::filesystem::create_directories(folder);
-  const char* const before = std::getenv("TMPDIR");
-  const std::string kept = before ? before : "";
-  setenv("TMPDIR", folder.c_str(), 1);
-  {
-    const UnnamedFile file;
-    std::ofstream(file.path()) << "contents";
-    EXPECT_EQ(text_of(file.path()), "contents");
-    EXPECT_TRUE(std::filesystem::is_empty(folder));
-  }
-  before ? setenv("TMPDIR", kept.c_str(), 1) : unsetenv("TMPDIR");
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

@@ -234,20 +234,6 @@ TEST(CubicField, ThinLayersAtFacesKeepTheirValues) {
       }
 }
 
-/// Bricks that begin with five components, and are widened late, hold what bricks of eight do.
-TEST(CubicField, BricksAreWidenedLate) {
-  const AlignedBox3i box(Vector3i::Zero(), Vector3i(135, 135, 135));
-  const auto symmetric = [](const Vector3i& v) { return polynomial(v.cast<double>() / 8, {1, 2, 3}, true); };
-  TensorGrid late = dense_grid(box, sheared(), symmetric), early = late;
-  late.blocks.back().values[0](0, 1) += 1;
-  early.blocks.front().values[0](0, 1) += 1;
-  const TensorField a(late, fading), b(early, fading);
-  ASSERT_FALSE(a.is_symmetric());
-  TensorSampler one(a), other(b);
-  for (const Vector3d& index : {Vector3d(60.3, 70.1, 64.9), Vector3d(40, 90.5, 20.25), Vector3d(100.7, 30.2, 111.1)})
-    EXPECT_EQ(one.at(sheared() * index), other.at(sheared() * index));
-}
-
 /// Values beside each other whose squares are far apart, some beyond single precision.
 TEST(CubicField, TheBoundHoldsForValuesOfAnySize) {
   for (const double large : {1e10, 1e20, 1e35}) {

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "volumes/bricks/brick_layout.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/block_source.h"
 #include "volumes/sampling/tensor_sampler.h"
@@ -63,7 +64,7 @@ void expect_same(const TensorField& a, const TensorField& b) {
   for (const Vector3i& at : a.bricks()) {
     const TensorBrick one = a.brick(at), other = b.brick(at);
     EXPECT_TRUE(one.strongest == other.strongest) << at.transpose();
-    for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
+    for (int voxel = 0; voxel < LinearBrick::coefficients; ++voxel)
       ASSERT_TRUE(same(one.tensor(voxel), other.tensor(voxel))) << at.transpose() << ", voxel " << voxel;
   }
 }

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "volumes/bricks/brick_layout.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
@@ -170,7 +171,8 @@ TEST(TensorField, KnowsTheStrongestDeviatorOfABrickAtAnyScale) {
       for (int x = 0; x < 2; ++x) {
         const TensorBrick brick = field.brick({x, 0, 0});
         double greatest = 0;
-        for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel) greatest = std::max(greatest, deviator(brick, voxel));
+        for (int voxel = 0; voxel < LinearBrick::coefficients; ++voxel)
+          greatest = std::max(greatest, deviator(brick, voxel));
         EXPECT_GE(brick.strongest, greatest * (1 + 9e-6)) << scale;
         EXPECT_LE(brick.strongest, greatest * (1 + 2e-5)) << scale;
       }

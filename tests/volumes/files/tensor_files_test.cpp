@@ -111,33 +111,6 @@ TEST(TensorFiles, StockOpenVdbReadsThem) {
   }
 }
 
-TEST(TensorFiles, NumberedAndLetteredScalars) {
-  const auto scalar = [](const std::string& name, double value) -> openvdb::GridBase::Ptr {
-    const auto grid = stock_grid<openvdb::FloatGrid>(name, 0);
-    grid->tree().setValue(openvdb::Coord(1, 2, -3), static_cast<float>(value));
-    return grid;
-  };
-  openvdb::GridPtrVec numbered, full, six;
-  for (int i = 0; i < 9; ++i) {
-    numbered.push_back(scalar("T_" + std::to_string(i), i + 1));
-    full.push_back(scalar(std::string("T.") + "xyz"[i / 3] + "xyz"[i % 3], i + 1));
-    if (i % 3 >= i / 3) six.push_back(scalar(std::string("T.") + "xyz"[i / 3] + "xyz"[i % 3], i + 1));
-  }
-  std::reverse(full.begin(), full.end());  // The order in the file does not matter.
-  Matrix3f all, symmetric;
-  all << 1, 2, 3, 4, 5, 6, 7, 8, 9;
-  symmetric << 1, 2, 3, 2, 5, 6, 3, 6, 9;
-  const Temporary path("a.vdb");
-  for (const auto& [grids, expected] : {std::pair(numbered, all), std::pair(full, all), std::pair(six, symmetric)}) {
-    write_stock(path, grids);
-    const TensorGrid read = read_tensor_vdb(path);
-    EXPECT_EQ(read.name, "T");
-    ASSERT_EQ(read.active_voxels(), 1u);
-    ASSERT_NE(find(read, {1, 2, -3}), nullptr);
-    EXPECT_EQ(*find(read, {1, 2, -3}), expected);
-  }
-}
-
 TEST(TensorFiles, DoublePrecisionRows) {
   openvdb::GridPtrVec rows;
   for (int row = 0; row < 3; ++row) {
@@ -152,15 +125,12 @@ TEST(TensorFiles, DoublePrecisionRows) {
 }
 
 TEST(TensorFiles, ActiveWhereAnyComponentIsAndZeroElsewhere) {
-  openvdb::GridPtrVec rows;
-  for (int row = 0; row < 3; ++row) {
-    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(7));
-    grid->tree().setValueOn({row, 0, 0}, openvdb::Vec3s(1, 2, 3));
-    grid->tree().setValueOff({5, 5, 5}, openvdb::Vec3s(9));  // Inactive voxels do not count, whatever their values.
-    rows.push_back(grid);
-  }
   const Temporary path("a.vdb");
-  write_stock(path, rows);
+  write_stock(path, stock_rows("T", [](auto& grid, int row) {
+                grid.tree().root().setBackground(openvdb::Vec3s(7), false);
+                grid.tree().setValueOn({row, 0, 0}, openvdb::Vec3s(1, 2, 3));
+                grid.tree().setValueOff({5, 5, 5}, openvdb::Vec3s(9));  // It does not count.
+              }));
   const TensorGrid read = read_tensor_vdb(path);
   EXPECT_EQ(read.active_voxels(), 3u);
   Matrix3f expected = Matrix3f::Zero();
@@ -171,15 +141,11 @@ TEST(TensorFiles, ActiveWhereAnyComponentIsAndZeroElsewhere) {
 
 /// Also where all voxels of a block are active, and a block was read before it.
 TEST(TensorFiles, ComponentsOfGridsWithoutAVoxelAreZero) {
-  openvdb::GridPtrVec rows;
-  for (int row = 0; row < 3; ++row) {
-    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0));
-    grid->denseFill({{0, 0, 0}, {7, 7, row == 0 ? 15 : 7}}, openvdb::Vec3s(1, 2, 3));
-    rows.push_back(grid);
-  }
-  openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows[1])->tree().setValueOn({0, 0, 8}, openvdb::Vec3s(4, 5, 6));
   const Temporary path("a.vdb");
-  write_stock(path, rows);
+  write_stock(path, stock_rows("T", [](auto& grid, int row) {
+                grid.denseFill({{0, 0, 0}, {7, 7, row == 0 ? 15 : 7}}, openvdb::Vec3s(1, 2, 3));
+                if (row == 1) grid.tree().setValueOn({0, 0, 8}, openvdb::Vec3s(4, 5, 6));
+              }));
   const BlockSource source = open_tensor_vdb(path);
   TensorBlock block;
   read_block(source, 0, block);
@@ -193,13 +159,8 @@ TEST(TensorFiles, ComponentsOfGridsWithoutAVoxelAreZero) {
 }
 
 TEST(TensorFiles, OfGridsWithOneNameTheSameIsReadEachTime) {
-  openvdb::GridPtrVec rows;
-  for (int i = 0; i < 6; ++i) {
-    rows.push_back(
-        stock_grid<openvdb::Vec3SGrid>((i < 3 ? "T_row" : "U_row") + std::to_string(i % 3), openvdb::Vec3s(0)));
-    openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows.back())
-        ->denseFill({{0, 0, 0}, {7, 7, 7}}, openvdb::Vec3s(static_cast<float>(i / 3 + 1)));
-  }
+  openvdb::GridPtrVec rows = voxel_rows("T", 1), others = voxel_rows("U", 2);
+  rows.insert(rows.end(), others.begin(), others.end());
   const Temporary path("a.vdb");
   write_stock(path, rows);
   std::string bytes = bytes_of(path);
@@ -270,14 +231,11 @@ TEST(TensorFiles, DamagedVoxelsAreNoticedWhenTheyAreRead) {
 }
 
 TEST(TensorFiles, ActiveTilesAreVoxels) {
-  openvdb::GridPtrVec rows;
-  for (int row = 0; row < 3; ++row) {
-    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0));
+  const openvdb::GridPtrVec rows = stock_rows("T", [](auto& grid, int row) {
     // One tile of a leaf's size with voxels beside it, and one tile of the next level (128³).
-    grid->sparseFill(openvdb::CoordBBox(-1, -8, 0, 8, -1, 7), openvdb::Vec3s(static_cast<float>(row + 1)));
-    grid->tree().addTile(2, openvdb::Coord(128, 0, 0), openvdb::Vec3s(4), true);
-    rows.push_back(grid);
-  }
+    grid.sparseFill(openvdb::CoordBBox(-1, -8, 0, 8, -1, 7), openvdb::Vec3s(static_cast<float>(row + 1)));
+    grid.tree().addTile(2, openvdb::Coord(128, 0, 0), openvdb::Vec3s(4), true);
+  });
   EXPECT_GT(openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows[0])->tree().activeTileCount(), 1u);
   const Temporary path("a.vdb");
   write_stock(path, rows);
@@ -324,13 +282,8 @@ TEST(TensorFiles, FilesWrittenAsAStream) {
 
 TEST(TensorFiles, ChoosesAmongFieldsByName) {
   const Temporary path("a.vdb");
-  openvdb::GridPtrVec grids;
-  for (const std::string name : {"A", "B"})
-    for (int row = 0; row < 3; ++row) {
-      const auto grid = stock_grid<openvdb::Vec3SGrid>(name + "_row" + std::to_string(row), openvdb::Vec3s(0));
-      grid->tree().setValue({0, 0, 0}, openvdb::Vec3s(name == "A" ? 1 : 2));
-      grids.push_back(grid);
-    }
+  openvdb::GridPtrVec grids = voxel_rows("A", 1), others = voxel_rows("B", 2);
+  grids.insert(grids.end(), others.begin(), others.end());
   grids.push_back(stock_grid<openvdb::FloatGrid>("density", 0));
   grids.push_back(stock_grid<openvdb::BoolGrid>("mask", false));
   write_stock(path, grids);
@@ -346,21 +299,9 @@ TEST(TensorFiles, ChoosesAmongFieldsByName) {
               ThrowsMessage<std::runtime_error>(HasSubstr("no active voxel")));
 }
 
-TEST(TensorFiles, IncompleteFieldIsNoField) {
-  const Temporary path("a.vdb");
-  write_stock(path, {stock_grid<openvdb::Vec3SGrid>("T_row0", openvdb::Vec3s(0)),
-                     stock_grid<openvdb::Vec3SGrid>("T_row2", openvdb::Vec3s(0))});
-  EXPECT_THAT([&] { read_tensor_vdb(path); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("T_row0 (vec3s), T_row2 (vec3s)")));
-}
-
 TEST(TensorFiles, RefusesDifferentTransformsAndFrustums) {
   const Temporary path("a.vdb");
-  openvdb::GridPtrVec rows;
-  for (int row = 0; row < 3; ++row) {
-    rows.push_back(stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0)));
-    openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows.back())->tree().setValue({0, 0, 0}, openvdb::Vec3s(1));
-  }
+  const openvdb::GridPtrVec rows = voxel_rows("T");
   rows[2]->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
   write_stock(path, rows);
   EXPECT_THAT([&] { read_tensor_vdb(path); }, ThrowsMessage<std::runtime_error>(HasSubstr("different transforms")));
@@ -460,22 +401,11 @@ TEST(TensorFiles, VoxelsOfAnySizeAreWrittenAndRead) {
 
 TEST(TensorFiles, AUnitThatIsNoNumberIsAnErrorWithTheGrid) {
   const Temporary path("a.vdb");
-  openvdb::GridPtrVec rows;
-  for (const char* name : {"t_row0", "t_row1", "t_row2"}) {
-    rows.push_back(stock_grid<openvdb::Vec3SGrid>(name, openvdb::Vec3s(0)));
-    openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows.back())->tree().setValue({0, 0, 0}, openvdb::Vec3s(1));
-    rows.back()->insertMeta("tensorray:length_unit", openvdb::StringMetadata("-1e-6"));
-  }
+  const openvdb::GridPtrVec rows = voxel_rows("t");
+  for (const auto& row : rows) row->insertMeta("tensorray:length_unit", openvdb::StringMetadata("-1e-6"));
   write_stock(path, rows);
   EXPECT_THAT([&] { read_tensor_vdb(path); },
               ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("a.vdb"), HasSubstr("length_unit"))));
-}
-
-TEST(TensorFiles, DeriveNeedsTheRightKindOfGrid) {
-  const Temporary path("a.vdb");
-  write_stock(path, {stock_grid<openvdb::FloatGrid>("f", 0)});
-  EXPECT_THAT([&] { read_tensor_vdb(path, "", Derive::gradient); },
-              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("vector grid"), HasSubstr("f (float)"))));
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
 #include "volumes/making/field_making.h"
 
-#include <cmath>
 #include <limits>
 #include <random>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
+
+#include "tests/volumes/grid_support.h"
+#include "volumes/bricks/brick_layout.h"
 
 namespace tensorray {
 namespace {
@@ -20,16 +22,10 @@ BlockSource source_of(const std::function<Matrix3d(const Vector3i&)>& value) {
   return dense_source(box, Eigen::Affine3d(Eigen::Scaling(0.25)), value);
 }
 
-Matrix3d general(const Vector3i& i) {
-  return Matrix3d::NullaryExpr([&](Eigen::Index row, Eigen::Index column) {
-    return std::sin(1.3 * i.x() + 0.7 * i.y() + 0.2 * i.z() + 2.1 * double(row) + 0.9 * double(column));
-  });
-}
-
-Matrix3d symmetric(const Vector3i& i) { return general(i) + general(i).transpose(); }
+Matrix3d symmetric(const Vector3i& i) { return waves(i) + waves(i).transpose(); }
 
 /// Symmetric in most blocks, but not in all that are looked at for a guess.
-Matrix3d mixed(const Vector3i& i) { return i.x() >= 8 && i.x() < 10 && i.y() == 9 ? general(i) : symmetric(i); }
+Matrix3d mixed(const Vector3i& i) { return i.x() >= 8 && i.x() < 10 && i.y() == 9 ? waves(i) : symmetric(i); }
 
 /// Not finite in a layer at the edge, of more than a block, and in single voxels.
 Matrix3d damaged(const Vector3i& i) {
@@ -46,8 +42,8 @@ void expect_same_bricks(const TensorField& a, const TensorField& b) {
   for (const Vector3i& place : a.bricks()) {
     const TensorBrick one = a.brick(place), other = b.brick(place);
     EXPECT_EQ(one.strongest, other.strongest);
-    ASSERT_TRUE(std::equal(one.bending, one.bending + TensorBrick::trailing_offset(one.components), other.bending));
-    ASSERT_TRUE(std::equal(one.trailing, one.trailing + TensorBrick::voxels, other.trailing));
+    ASSERT_TRUE(std::equal(one.bending, one.bending + LinearBrick::trailing_offset(one.components), other.bending));
+    ASSERT_TRUE(std::equal(one.trailing, one.trailing + LinearBrick::coefficients, other.trailing));
   }
 }
 
@@ -68,13 +64,13 @@ void expect_as_from_grid(const std::function<Matrix3d(const Vector3i&)>& value, 
 TEST(FieldMaking, GivesTheFieldOfThePreprocessedGrid) {
   for (const Eigenvalues mode :
        {Eigenvalues::automatic, Eigenvalues::raw, Eigenvalues::absolute, Eigenvalues::positive})
-    for (const auto& value : {general, symmetric, mixed, damaged}) expect_as_from_grid(value, mode);
+    for (const auto& value : {waves, symmetric, mixed, damaged}) expect_as_from_grid(value, mode);
 }
 
 TEST(FieldMaking, DoesNotDependOnThreads) {
-  const MadeField many = make_field(source_of(general), Eigenvalues::absolute);
+  const MadeField many = make_field(source_of(waves), Eigenvalues::absolute);
   const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
-  const MadeField one = make_field(source_of(general), Eigenvalues::absolute);
+  const MadeField one = make_field(source_of(waves), Eigenvalues::absolute);
   EXPECT_EQ(many.eigenvalues.norm_lost, one.eigenvalues.norm_lost);
   expect_same_bricks(*many.field, *one.field);
 }

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
+#include "tests/volumes/grid_support.h"
 #include "volumes/making/load_stress.h"
 #include "volumes/tensors/eigenvalues.h"
 
@@ -18,25 +19,21 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 /// The tensor of a generated grid at an index.
-Matrix3d at(const TensorGrid& grid, const Eigen::Vector3i& index) {
-  for (const TensorBlock& block : grid.blocks) {
-    const Eigen::Vector3i p = index - block.origin;
-    if ((p.array() < 0).any() || (p.array() >= TensorBlock::size).any()) continue;
-    const int offset = TensorBlock::offset(p.x(), p.y(), p.z());
-    EXPECT_TRUE(block.active[offset]);
-    return block.values[offset].cast<double>();
-  }
-  ADD_FAILURE() << "no voxel at " << index.transpose();
-  return Matrix3d::Zero();
-}
+Matrix3d at(const TensorGrid& grid, const Eigen::Vector3i& index) { return find(grid, index)->cast<double>(); }
 
 /// Calls `visit(world position, tensor)` at each voxel.
 void for_each(const TensorGrid& grid, const std::function<void(const Vector3d&, const Matrix3d&)>& visit) {
-  for (const TensorBlock& block : grid.blocks)
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-      if (block.active[offset])
-        visit(grid.to_world * (block.origin + TensorBlock::position(offset)).cast<double>(),
-              block.values[offset].cast<double>());
+  for_each_active(grid, [&](const Eigen::Vector3i& index, const Eigen::Matrix3f& tensor) {
+    visit(grid.to_world * index.cast<double>(), tensor.cast<double>());
+  });
+}
+
+/// The tensor of a generator at a position.
+Matrix3d sampled(const Generator& generator, const Vector3d& position) {
+  GridSettings grid;
+  grid.resolution.setOnes();
+  grid.min = grid.max = position;
+  return at(generate(generator, grid), {0, 0, 0});
 }
 
 TEST(PointLoad, TheLoadIsOneVoxelAboveTheBox) {
@@ -46,40 +43,28 @@ TEST(PointLoad, TheLoadIsOneVoxelAboveTheBox) {
   const TensorGrid grid = generate(load, settings);
   EXPECT_LE((grid.to_world.linear() - 0.1 * Matrix3d::Identity()).norm(), 1e-14);
   EXPECT_LE((grid.to_world * Vector3d(20, 20, 19) - Vector3d(1, 1, -0.1)).norm(), 1e-14);
-  for_each(grid, [](const Vector3d& p, const Matrix3d& tensor) {
-    const Matrix3d expected = point_load_stress(p, 1, 0.3);
-    ASSERT_LE((tensor - expected).norm(), 1e-6 * expected.norm());
-  });
   EXPECT_LT(at(grid, {10, 10, 19})(2, 2), 0);  // Compression under the load.
 }
 
-TEST(TwoPointLoad, AddsTheStressesOfBoth) {
-  TwoPointLoad loads;
-  loads.second_load = 2;
-  const TensorGrid grid = generate(loads, default_grid(loads, 17));
-  for_each(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
-    const Vector3d half(loads.separation / 2, 0, 0);
-    const Matrix3d expected = point_load_stress(p + half, 1, 0.3) + point_load_stress(p - half, 2, 0.3);
-    ASSERT_LE((tensor - expected).norm(), 1e-6 * expected.norm());
-  });
-}
-
-TEST(Loads, PressOnDiscsOfTheirRadius) {
-  PointLoad load;
-  load.radius = 0.3;
-  const TensorGrid one = generate(load, default_grid(load, 17));
-  for_each(one, [](const Vector3d& p, const Matrix3d& tensor) {
-    const Matrix3d expected = disc_load_stress(p, 1, 0.3, 0.3);
-    ASSERT_LE((tensor - expected).norm(), 1e-6 * expected.norm());
-  });
-  TwoPointLoad loads;
-  loads.radius = 0.2;
-  const TensorGrid two = generate(loads, default_grid(loads, 17));
-  for_each(two, [&](const Vector3d& p, const Matrix3d& tensor) {
-    const Vector3d half(loads.separation / 2, 0, 0);
-    const Matrix3d expected = disc_load_stress(p + half, 1, 0.2, 0.3) + disc_load_stress(p - half, 1, 0.2, 0.3);
-    ASSERT_LE((tensor - expected).norm(), 1e-6 * expected.norm());
-  });
+/// Points, or discs of their radius.
+TEST(Loads, HaveTheStressOfEach) {
+  for (const double radius : {0.0, 0.2}) {
+    const auto stress = [&](const Vector3d& p, double load) {
+      return radius > 0 ? disc_load_stress(p, load, radius, 0.3) : point_load_stress(p, load, 0.3);
+    };
+    const PointLoad load{1, 0.3, radius};
+    for_each(generate(load, default_grid(load, 17)), [&](const Vector3d& p, const Matrix3d& tensor) {
+      ASSERT_LE((tensor - stress(p, 1)).norm(), 1e-6 * stress(p, 1).norm());
+    });
+    TwoPointLoad loads;
+    loads.second_load = 2;
+    loads.radius = radius;
+    const Vector3d half(0.4, 0, 0);
+    for_each(generate(loads, default_grid(loads, 17)), [&](const Vector3d& p, const Matrix3d& tensor) {
+      const Matrix3d expected = stress(p + half, 1) + stress(p - half, 2);
+      ASSERT_LE((tensor - expected).norm(), 1e-6 * expected.norm());
+    });
+  }
 }
 
 TEST(Rotation, TurnsAboutItsAxis) {
@@ -156,10 +141,7 @@ TEST(Helix, HasItsEigenvaluesOnTheCurve) {
   for (const double angle : {0.0, 0.7, 2.0, 4.0, 9.0}) {
     const double rise = helix.pitch / (2 * pi);
     const Vector3d on(helix.radius * std::cos(angle), helix.radius * std::sin(angle), rise * angle);
-    GridSettings grid;
-    grid.resolution.setOnes();
-    grid.min = grid.max = on;
-    const Matrix3d tensor = at(generate(helix, grid), {0, 0, 0});
+    const Matrix3d tensor = sampled(helix, on);
     const Vector3d tangent =
         Vector3d(-helix.radius * std::sin(angle), helix.radius * std::cos(angle), rise).normalized();
     EXPECT_LE((tensor * tangent - helix.along * tangent).norm(), 1e-6);
@@ -170,12 +152,7 @@ TEST(Helix, HasItsEigenvaluesOnTheCurve) {
 
 TEST(Helix, IsContinuousAndIsotropicFarAway) {
   const Helix helix;
-  const auto sample = [&](const Vector3d& p) {
-    GridSettings grid;
-    grid.resolution.setOnes();
-    grid.min = grid.max = p;
-    return at(generate(helix, grid), {0, 0, 0});
-  };
+  const auto sample = [&](const Vector3d& p) { return sampled(helix, p); };
   EXPECT_LE((sample({3, 0, 0}) - helix.background * Matrix3d::Identity()).norm(), 1e-6);
   // Across the branch of the angle, across the height half-way between turns, and across the axis.
   const double h = 1e-5;
@@ -223,37 +200,23 @@ TEST(Generators, MetadataNamesEveryParameter) {
               testing::HasSubstr("tensor=1,2,3,4,5,6,7,8,9 "));
 }
 
-template <class G>
-void expect_refused(const G& generator, const std::string& parameter) {
+template <class G, class Value>
+void expect_refused(Value G::*parameter, const Value& value, const std::string& name) {
+  G generator;
+  generator.*parameter = value;
   EXPECT_THAT([&] { generate(generator, default_grid(generator, 3)); },
-              testing::ThrowsMessage<std::invalid_argument>(testing::StartsWith(parameter)));
+              testing::ThrowsMessage<std::invalid_argument>(testing::StartsWith(name)));
 }
 
 TEST(Generators, RefuseParametersOutOfRange) {
-  PointLoad load;
-  load.poisson_ratio = 0.6;
-  expect_refused(load, "poisson_ratio");
-  load = {};
-  load.radius = -0.1;
-  expect_refused(load, "radius");
-  load = {};
-  load.load = NAN;
-  expect_refused(load, "load");
-  Rotation rotation;
-  rotation.axis.setZero();
-  expect_refused(rotation, "axis");
-  Shear shear;
-  shear.gradient.setZero();
-  expect_refused(shear, "gradient");
-  Vortex vortex;
-  vortex.core = 0;
-  expect_refused(vortex, "core");
-  Helix helix;
-  helix.thickness = -1;
-  expect_refused(helix, "thickness");
-  Constant constant;
-  constant.tensor(1, 2) = INFINITY;
-  expect_refused(constant, "tensor");
+  expect_refused(&PointLoad::poisson_ratio, 0.6, "poisson_ratio");
+  expect_refused(&PointLoad::radius, -0.1, "radius");
+  expect_refused<PointLoad, double>(&PointLoad::load, NAN, "load");
+  expect_refused<Rotation, Vector3d>(&Rotation::axis, Vector3d::Zero(), "axis");
+  expect_refused<Shear, Vector3d>(&Shear::gradient, Vector3d::Zero(), "gradient");
+  expect_refused(&Vortex::core, 0.0, "core");
+  expect_refused(&Helix::thickness, -1.0, "thickness");
+  expect_refused<Constant, Matrix3d>(&Constant::tensor, Matrix3d::Constant(INFINITY), "tensor");
 }
 
 TEST(Generators, RefuseImpossibleGrids) {

@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "tests/volumes/grid_support.h"
+
 namespace tensorray {
 namespace {
 
@@ -22,12 +24,6 @@ TensorGrid grid_of(const AlignedBox3i& voxels, const std::function<Matrix3d(cons
   return dense_grid(voxels, Eigen::Affine3d(Eigen::Scaling(0.5, 1.0, 3.0)), value);
 }
 
-Matrix3d waves(const Vector3i& i) {
-  return Matrix3d::NullaryExpr([&](Eigen::Index row, Eigen::Index column) {
-    return std::sin(1.3 * i.x() + 0.7 * i.y() + 0.2 * i.z() + 2.1 * double(row) + 0.9 * double(column));
-  });
-}
-
 /// Holes, from single voxels to whole blocks, so that sums along one axis pass through voxels and blocks without value.
 void make_holes(TensorGrid& grid) {
   for (TensorBlock& block : grid.blocks)
@@ -39,21 +35,6 @@ void make_holes(TensorGrid& grid) {
       block.values[offset].setZero();
     }
   remove_empty_blocks(grid);
-}
-
-template <class Function>
-void for_each_active(const TensorGrid& grid, const Function& function) {
-  for (const TensorBlock& block : grid.blocks)
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-      if (block.active[offset]) function(Vector3i(block.origin + TensorBlock::position(offset)), block.values[offset]);
-}
-
-Matrix3f value_at(const TensorGrid& grid, const Vector3i& wanted) {
-  Matrix3f found = Matrix3f::Constant(std::numeric_limits<float>::quiet_NaN());
-  for_each_active(grid, [&](const Vector3i& i, const Matrix3f& value) {
-    if (i == wanted) found = value;
-  });
-  return found;
 }
 
 /// The definition, without separating axes.
@@ -69,15 +50,6 @@ Matrix3d mean_about(const TensorGrid& grid, const Vector3i& middle, double devia
   return sum / weights;
 }
 
-void expect_same(const TensorGrid& a, const TensorGrid& b) {
-  ASSERT_EQ(a.blocks.size(), b.blocks.size());
-  for (std::size_t i = 0; i < a.blocks.size(); ++i) {
-    EXPECT_EQ(a.blocks[i].origin, b.blocks[i].origin);
-    EXPECT_EQ(a.blocks[i].active, b.blocks[i].active);
-    EXPECT_EQ(a.blocks[i].values, b.blocks[i].values);
-  }
-}
-
 TEST(Smoothing, ConstantsStayAtBordersAndBesideHoles) {
   Matrix3d constant;
   constant << 1.1, 0.3, -7, 1e-9, 3e5, 0.7, -0.2, 1.0 / 3, 13;
@@ -86,7 +58,7 @@ TEST(Smoothing, ConstantsStayAtBordersAndBesideHoles) {
   for (const double deviation : {0.3, 1.0, 2.7}) {
     TensorGrid smoothed = grid;
     smooth(smoothed, deviation);
-    expect_same(smoothed, grid);
+    expect_same_blocks(smoothed, grid);
   }
 }
 
@@ -119,7 +91,7 @@ TEST(Smoothing, IsTheMeanOfActiveVoxels) {
     TensorGrid smoothed = grid;
     smooth(smoothed, deviation);
     for (const Vector3i& i : {Vector3i(-13, -3, 7), Vector3i(9, 7, 17), Vector3i(-1, 14, 30), Vector3i(25, 0, 6)}) {
-      const Matrix3f value = value_at(smoothed, i);
+      const Matrix3f value = *find(smoothed, i);
       EXPECT_LT((value.cast<double>() - mean_about(grid, i, deviation)).cwiseAbs().maxCoeff(), 1e-7) << i.transpose();
     }
   }
@@ -136,7 +108,7 @@ TEST(Smoothing, DoesNotDependOnThreads) {
   smooth(many, 2);
   const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
   smooth(one, 2);
-  expect_same(many, one);
+  expect_same_blocks(many, one);
 }
 
 TEST(Smoothing, RejectsDeviationsOutOfRange) {

@@ -218,11 +218,7 @@ TEST(DamagedFiles, NotVdbFiles) {
 TEST(DamagedFiles, ReadsFormatsThatHoldUnknownGrids) {
   // An unknown type in the table of grids does not hide other grids: rename the type of an unrelated grid.
   const Temporary path("a.vdb");
-  openvdb::GridPtrVec grids;
-  for (int row = 0; row < 3; ++row) {
-    grids.push_back(stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0)));
-    openvdb::gridPtrCast<openvdb::Vec3SGrid>(grids.back())->tree().setValue({0, 0, 0}, openvdb::Vec3s(1));
-  }
+  openvdb::GridPtrVec grids = voxel_rows("T");
   grids.insert(grids.begin(), stock_grid<openvdb::Int32Grid>("other", 0));
   write_stock(path, grids);
   std::string bytes = bytes_of(path);
@@ -260,14 +256,8 @@ TEST(DamagedFiles, VoxelsFarAwayAreRefused) {
       const auto scalar = stock_grid<openvdb::FloatGrid>("phi", 0);
       openvdb::GridPtrVec grids{scalar};
       fill(*scalar, each, 1.0f);
-      if (derive == Derive::none) {
-        grids.clear();
-        for (int row = 0; row < 3; ++row) {
-          const auto grid = stock_grid<openvdb::Vec3SGrid>("phi_row" + std::to_string(row), openvdb::Vec3s(0));
-          fill(*grid, each, openvdb::Vec3s(1));
-          grids.push_back(grid);
-        }
-      }
+      if (derive == Derive::none)
+        grids = stock_rows("phi", [&](auto& grid, int) { fill(grid, each, openvdb::Vec3s(1)); });
       write_stock(path, grids);
       EXPECT_THAT([&] { read_tensor_vdb(path, "", derive); },
                   ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("indices are beyond"))))

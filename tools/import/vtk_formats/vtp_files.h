@@ -13,6 +13,6 @@ namespace tensorray {
 /// Reads the polylines and the `wanted` numeric arrays, as doubles: see read_vtp_lines. VTK may end the process on
 /// damaged files: call this in a child process.
 /// @throw std::runtime_error with the reason (without the file).
-PolyLines read_vtp_file(const std::filesystem::path& path, const std::set<std::string>& wanted);
+PolylineData read_vtp_file(const std::filesystem::path& path, const std::set<std::string>& wanted);
 
 }  // namespace tensorray

@@ -85,7 +85,7 @@ Selection selection_of(vtkPolyData& polydata) {
   return selection;
 }
 
-PolyLines::Values doubles(vtkDataArray& array, const Indices& selected) {
+DataArray doubles(vtkDataArray& array, const Indices& selected) {
   const int components = array.GetNumberOfComponents();
   std::vector<double> values;
   values.reserve(selected.size() * static_cast<std::size_t>(components));
@@ -95,23 +95,23 @@ PolyLines::Values doubles(vtkDataArray& array, const Indices& selected) {
 }
 
 /// The wanted numeric arrays that have `count` values.
-Named<PolyLines::Values> chosen(vtkDataSetAttributes& attributes, const std::set<std::string>& wanted, vtkIdType count,
-                                const Indices& selected) {
-  Named<PolyLines::Values> arrays;
+std::map<std::string, DataArray> chosen(vtkDataSetAttributes& attributes, const std::set<std::string>& wanted,
+                                        vtkIdType count, const Indices& selected) {
+  std::map<std::string, DataArray> arrays;
   for (const std::string& name : wanted) {
     vtkDataArray* const array = attributes.GetArray(name.c_str());
     if (!array) continue;
     if (array->GetNumberOfTuples() != count)
       fail_damaged("the array \"" + name + "\" has not one value for each of what it describes");
-    arrays.emplace_back(name, doubles(*array, selected));
+    arrays.emplace(name, doubles(*array, selected));
   }
   return arrays;
 }
 
-PolyLines lines_of(vtkPolyData& polydata, const std::set<std::string>& wanted) {
-  PolyLines data;
+PolylineData lines_of(vtkPolyData& polydata, const std::set<std::string>& wanted) {
+  PolylineData data;
   const Selection selection = selection_of(polydata);
-  if (!selection.points.empty()) data.points = doubles(*polydata.GetPoints()->GetData(), selection.points);
+  for (const vtkIdType point : selection.points) data.points.emplace_back(polydata.GetPoints()->GetPoint(point));
   data.line_ends = selection.line_ends;
   data.point_data = chosen(*polydata.GetPointData(), wanted, polydata.GetNumberOfPoints(), selection.points);
   data.line_data = chosen(*polydata.GetCellData(), wanted, polydata.GetNumberOfCells(), selection.lines);
@@ -120,7 +120,7 @@ PolyLines lines_of(vtkPolyData& polydata, const std::set<std::string>& wanted) {
 
 }  // namespace
 
-PolyLines read_vtp_file(const Path& path, const std::set<std::string>& asked) {
+PolylineData read_vtp_file(const Path& path, const std::set<std::string>& asked) {
   const Tags tags = read_tags(path);
   std::set<std::string> wanted;  // Of an array that some pieces lack, VTK leaves the values there undefined.
   for (const std::string& name : asked)

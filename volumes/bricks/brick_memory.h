@@ -1,13 +1,11 @@
 #pragma once
-/// @file volumes/grids/brick_memory.h
-/// Memory for the bricks of a field, and for blocks of voxels on their way to these.
+/// @file volumes/bricks/brick_memory.h
+/// Memory for the bricks of a field, and for the blocks that they are made of.
 
 #include <cstddef>
-#include <functional>
 #include <memory>
 
 #include "base/files/descriptor.h"
-#include "volumes/grids/block_source.h"
 
 namespace tensorray {
 
@@ -31,14 +29,5 @@ BrickMemory bricks_of_file(Descriptor file, std::size_t count, std::size_t strid
 
 /// Frees the pages of all bricks but the first ones.
 void keep_bricks(BrickMemory& bricks, std::size_t count);
-
-/// Reads each block once, on all threads, and places it: first where tensors are symmetric; once more, where they are
-/// any, if some block has others.
-/// @param make   Makes what blocks are placed in, for symmetric tensors or for any.
-/// @param place  Places block i. @return false if the tensors are not symmetric, as those of `blocks` must be.
-/// @throw what these and `source` throw.
-BrickMemory place_blocks(
-    const BlockSource& source, const std::function<BrickMemory(bool symmetric)>& make,
-    const std::function<bool(std::size_t i, const TensorBlock& block, const BrickMemory& blocks)>& place);
 
 }  // namespace tensorray

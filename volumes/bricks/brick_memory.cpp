@@ -1,19 +1,11 @@
-#include "volumes/grids/brick_memory.h"
+#include "volumes/bricks/brick_memory.h"
 
-#include <atomic>
-#include <stdexcept>
 #include <utility>
-
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
-
-/// Number of blocks that a thread places in a row.
-constexpr std::size_t grain = 16;
 
 std::shared_ptr<float[]> owned_pages(void* pages, std::size_t bytes) {
   return {static_cast<float*>(pages), [bytes](float* floats) { unmap_pages(floats, bytes); }};
@@ -41,25 +33,6 @@ BrickMemory bricks_of_file(Descriptor file, std::size_t count, std::size_t strid
 void keep_bricks(BrickMemory& bricks, std::size_t count) {
   release_pages(bricks.brick(count), (bricks.count - count) * bricks.stride * sizeof(float));
   bricks.count = count;
-}
-
-BrickMemory place_blocks(
-    const BlockSource& source, const std::function<BrickMemory(bool symmetric)>& make,
-    const std::function<bool(std::size_t i, const TensorBlock& block, const BrickMemory& blocks)>& place) {
-  for (const bool symmetric : {true, false}) {
-    const BrickMemory blocks = make(symmetric);
-    std::atomic<bool> fits{true};
-    const tbb::blocked_range<std::size_t> all(0, source.shapes.size(), grain);
-    tbb::parallel_for(all, [&](const tbb::blocked_range<std::size_t>& range) {
-      TensorBlock block;
-      for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
-        read_block(source, i, block);
-        if (!place(i, block, blocks)) fits = false;
-      }
-    });
-    if (fits) return blocks;
-  }
-  throw std::logic_error("a block has no place");  // Any tensors fit the second time.
 }
 
 }  // namespace tensorray

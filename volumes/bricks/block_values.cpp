@@ -1,7 +1,10 @@
-// `continue_values` of coefficients.h.
+// `place_values` and `continue_values` of coefficients.h.
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 
 #include <tbb/parallel_for.h>
 
@@ -11,6 +14,48 @@ namespace tensorray {
 namespace {
 
 using Eigen::Vector3i;
+
+/// In double precision, for values of any size; NaN counts as zero.
+double max_squared_norm(const TensorBlock& block) {
+  double greatest = 0;
+  for (const Eigen::Matrix3f& value : block.values) greatest = std::max(greatest, value.cast<double>().squaredNorm());
+  return greatest;
+}
+
+/// @param norm  The greatest squared norm of a block's tensors in single precision.
+double squared_norm(float norm, const TensorBlock& block) {
+  return norm > min_square && norm < max_square ? double{norm} : max_squared_norm(block);
+}
+
+std::uint32_t bits_of(float number) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &number, sizeof bits);
+  return bits;
+}
+
+template <int components>
+std::optional<double> place(const TensorBlock& block, float* values) {
+  std::uint32_t asymmetry = 0;
+  float greatest = 0;
+  const auto square = [](float x) { return x * x; };
+  for (int voxel = 0; voxel < TensorBlock::voxels; ++voxel) {
+    const float* const T = block.values[voxel].data();
+    asymmetry |= (bits_of(T[1]) ^ bits_of(T[3])) | (bits_of(T[2]) ^ bits_of(T[6])) | (bits_of(T[5]) ^ bits_of(T[7]));
+    const float bending[] = {T[0] - T[8], T[1], T[2], T[3], T[4] - T[8], T[5], T[6], T[7]};
+    float* const to = values + CoefficientBlock::bending_offset(components, voxel);
+    if constexpr (components == TensorBrick::general)
+      std::copy_n(bending, components, to);
+    else
+      for (const int i : {0, 1, 2, 4, 5}) to[TensorBrick::stored_component(components, i)] = bending[i];
+    values[CoefficientBlock::trailing_offset(components) + voxel] = T[8];
+    const float even = square(T[2]) + square(T[6]);
+    const float odd = (square(T[1]) + square(T[5])) + (square(T[3]) + square(T[7]));
+    const float norm = (((square(T[0]) + square(T[4])) + even) + odd) + square(T[8]);
+    greatest = greatest < norm ? norm : greatest;
+  }
+  if (components == TensorBrick::symmetric && asymmetry != 0) return std::nullopt;
+  return squared_norm(greatest, block);
+}
 
 /// (3 − √3) / 6: where all voxels of a half space have the value 1, this is that of the spline, whose coefficients
 /// beyond are zero, at the first voxel beyond. It falls to zero from there without a change of sign, and hardly rings
@@ -64,6 +109,11 @@ VoxelMask continue_block(std::size_t block, const Coefficients& field, const std
 }
 
 }  // namespace
+
+std::optional<double> place_values(const TensorBlock& block, int components, float* values) {
+  return components == TensorBrick::symmetric ? place<TensorBrick::symmetric>(block, values)
+                                              : place<TensorBrick::general>(block, values);
+}
 
 void continue_values(const Coefficients& field) {
   if (field.interpolant.between == Interpolation::linear) return;

@@ -1,0 +1,49 @@
+#pragma once
+/// @file tests/volumes/grid_support.h
+/// Grids of tensors, and what is in them.
+
+#include <cmath>
+
+#include <Eigen/Core>
+#include <gtest/gtest.h>
+
+#include "volumes/grids/tensor_grid.h"
+
+namespace tensorray {
+
+/// Tensors that are not symmetric, and differ from voxel to voxel.
+inline Eigen::Matrix3d waves(const Eigen::Vector3i& i) {
+  return Eigen::Matrix3d::NullaryExpr([&](Eigen::Index row, Eigen::Index column) {
+    const double at = 2.1 * static_cast<double>(row) + 0.9 * static_cast<double>(column);
+    return std::sin(1.3 * i.x() + 0.7 * i.y() + 0.2 * i.z() + at);
+  });
+}
+
+/// Calls `visit(index, tensor)` at each active voxel.
+template <class Visit>
+void for_each_active(const TensorGrid& grid, const Visit& visit) {
+  for (const TensorBlock& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[offset])
+        visit(Eigen::Vector3i(block.origin + TensorBlock::position(offset)), block.values[offset]);
+}
+
+/// The tensor of a voxel; null if it is not active.
+inline const Eigen::Matrix3f* find(const TensorGrid& grid, const Eigen::Vector3i& index) {
+  const Eigen::Matrix3f* found = nullptr;
+  for_each_active(grid, [&](const Eigen::Vector3i& i, const Eigen::Matrix3f& value) {
+    if (i == index) found = &value;
+  });
+  return found;
+}
+
+inline void expect_same_blocks(const TensorGrid& a, const TensorGrid& b) {
+  ASSERT_EQ(a.blocks.size(), b.blocks.size());
+  for (std::size_t i = 0; i < a.blocks.size(); ++i) {
+    EXPECT_EQ(a.blocks[i].origin, b.blocks[i].origin);
+    EXPECT_EQ(a.blocks[i].active, b.blocks[i].active);
+    EXPECT_EQ(a.blocks[i].values, b.blocks[i].values);
+  }
+}
+
+}  // namespace tensorray
