@@ -63,41 +63,26 @@ std::vector<Vector3i> places_about(const BlockTable& table) {
   return places;
 }
 
-/// Active voxels of a block and, on each side, of `margin` more: a row along z is a number whose bit z + margin is
-/// voxel z.
-struct WideMask {
-  static constexpr int margin = 2, width = block_edge + 2 * margin;
-
-  std::uint16_t rows[width][width] = {};
-
-  void add(const VoxelMask& mask, const Vector3i& offset) {
-    const auto first = [](int o) { return std::max(0, margin + block_edge * o); };
-    const auto end = [](int o) { return std::min(width, margin + block_edge * (o + 1)); };
-    for (int x = first(offset.x()); x < end(offset.x()); ++x)
-      for (int y = first(offset.y()); y < end(offset.y()); ++y) {
-        const int from_x = x - margin - block_edge * offset.x(), from_y = y - margin - block_edge * offset.y();
-        const unsigned row = mask[static_cast<std::size_t>(from_x * block_edge + from_y)];
-        const int shift = margin + block_edge * offset.z();
-        const unsigned bits = shift < 0 ? row >> -shift : row << shift;
-        rows[x][y] = static_cast<std::uint16_t>(rows[x][y] | (bits & ((1u << width) - 1)));
-      }
-  }
-
-  /// The block's voxels with an active voxel within `reach` along each axis.
-  VoxelMask spread(int reach) const {
-    VoxelMask mask{};
-    for (int x = 0; x < block_edge; ++x)
-      for (int y = 0; y < block_edge; ++y) {
-        unsigned any = 0;
-        for (int i = -reach; i <= reach; ++i)
-          for (int j = -reach; j <= reach; ++j) any |= rows[x + margin + i][y + margin + j];
-        unsigned spread = any;
-        for (int k = 1; k <= reach; ++k) spread |= any << k | any >> k;
-        mask[static_cast<std::size_t>(x * block_edge + y)] = static_cast<std::uint8_t>(spread >> margin);
-      }
-    return mask;
-  }
-};
+/// The voxels of a block that are set, or have one that is within `reach` along an axis.
+/// @param before, after  Of the neighbours along it; null: none.
+VoxelMask spread(const VoxelMask& mask, int axis, int reach, const VoxelMask* before, const VoxelMask* after) {
+  VoxelMask result{};
+  const auto row = [&](int x, int y) -> unsigned {
+    const int at = axis == 0 ? x : y;
+    const VoxelMask* const from = at < 0 ? before : at >= block_edge ? after : &mask;
+    return from ? (*from)[static_cast<std::size_t>((x & 7) * block_edge + (y & 7))] : 0u;
+  };
+  for (int x = 0; x < block_edge; ++x)
+    for (int y = 0; y < block_edge; ++y) {
+      const auto i = static_cast<std::size_t>(x * block_edge + y);
+      const unsigned along_z = (before ? (*before)[i] : 0u) | unsigned{mask[i]} << 8 | (after ? (*after)[i] : 0u) << 16;
+      unsigned any = 0;
+      for (int k = -reach; k <= reach; ++k)
+        any |= axis == 0 ? row(x + k, y) : axis == 1 ? row(x, y + k) : along_z >> (block_edge + k);
+      result[i] = static_cast<std::uint8_t>(any);
+    }
+  return result;
+}
 
 /// Removes voxels outside the extent.
 void cut(VoxelMask& mask, const Vector3i& place, const AlignedBox3i& extent) {
@@ -167,21 +152,24 @@ CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i
   const int reach = reach_of(interpolant);
   const std::vector<Vector3i> candidates = reach == 0 ? table.places : places_about(table);
   const BrickIndex found(candidates);
-  std::vector<VoxelMask> active(candidates.size()), filled(candidates.size());
+  std::vector<VoxelMask> active(candidates.size());
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
     const std::uint32_t block = table.index.find(candidates[i]);
     if (block != BrickIndex::missing) active[i] = mask_of(table.shapes[block]);
   });
-  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
-    filled[i] = active[i];
-    if (reach == 0) return;
-    WideMask wide;
-    for (int n = 0; n < neighbour_count; ++n)
-      if (const std::uint32_t at = found.find(candidates[i] + neighbour(n)); at != BrickIndex::missing)
-        wide.add(active[at], neighbour(n));
-    filled[i] = wide.spread(reach);
-    cut(filled[i], candidates[i], extent);
-  });
+  std::vector<VoxelMask> filled = active;
+  for (int axis = 0; reach > 0 && axis < 3; ++axis) {
+    const std::vector<VoxelMask> from = filled;
+    const auto mask_at = [&](const Vector3i& place) {
+      const std::uint32_t at = found.find(place);
+      return at == BrickIndex::missing ? nullptr : &from[at];
+    };
+    tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+      const Vector3i along = Vector3i::Unit(axis);
+      filled[i] = spread(from[i], axis, reach, mask_at(candidates[i] - along), mask_at(candidates[i] + along));
+      if (axis == 2) cut(filled[i], candidates[i], extent);
+    });
+  }
 
   const AlignedBox3i with_cells = bricks_with_cells(extent);
   CoefficientBricks result;

@@ -1,8 +1,6 @@
 #include "volumes/bricks/coefficients.h"
 
 #include <algorithm>
-#include <cstring>
-#include <type_traits>
 
 #include <tbb/parallel_for.h>
 
@@ -139,53 +137,17 @@ void solve_across(const CoefficientBricks& bricks, const Column& column, const R
   }
 }
 
-/// Copies the lines of a sheet of voxels, at x, to a buffer in which those of one z follow each other, or back.
-template <int components, bool back>
-void copy_sheet(const Column& column, int x, const BrickMemory& memory, float* buffer) {
-  constexpr int floats = components + 1;
-  const auto copy = [](float* voxel, float* place, std::size_t count) {
-    back ? std::memcpy(voxel, place, count * sizeof(float)) : std::memcpy(place, voxel, count * sizeof(float));
-  };
-  for (const std::uint32_t number : column.blocks) {
-    float* const block = memory.brick(number);
-    for (int y = 0; y < edge; ++y) {
-      const int first = CoefficientBlock::coefficient(x, y, 0);
-      for (int z = 0; z < edge; ++z) {
-        float* const place = buffer + (z * edge + y) * floats;
-        copy(block + CoefficientBlock::bending_offset(components, first + z), place, components);
-        copy(block + CoefficientBlock::trailing_offset(components) + first + z, place + components, 1);
-      }
-    }
-    buffer += edge * edge * floats;
-  }
-}
-
-/// Solves the lines of a column along z: eight neighbours along y together where they have the same runs.
+/// Solves the lines of a column along z.
 template <int components>
 void solve_along_z(const CoefficientBricks& bricks, const Column& column, const Runs& runs, const BrickMemory& memory) {
-  constexpr int floats = components + 1, all = edge * floats;
-  std::vector<float> buffer(static_cast<std::size_t>(runs.count * all));
-  std::vector<float*> pointers(static_cast<std::size_t>(runs.count));
-  const auto row = [&](int i, int x, int y) {
-    return bricks.filled[column.blocks[static_cast<std::size_t>(i)]][static_cast<std::size_t>(x * edge + y)];
-  };
-  for (int x = 0; x < edge; ++x) {
-    copy_sheet<components, false>(column, x, memory, buffer.data());
-    const auto solve = [&](auto width, int y, const auto& set) {
-      for (int i = 0; i < runs.count; ++i) pointers[static_cast<std::size_t>(i)] = buffer.data() + i * all + y * floats;
-      runs.visit(set, [&](int from, int length, bool continues_before, bool continues_after) {
-        solve_run<width.value>(pointers.data() + from, length, continues_before, continues_after);
-      });
+  std::vector<float*> pointers;
+  for (int line = 0; line < edge * edge; ++line) {
+    const auto set = [&](int i) {
+      const VoxelMask& mask = bricks.filled[column.blocks[static_cast<std::size_t>(i / edge)]];
+      return (mask[static_cast<std::size_t>(line)] >> i % edge & 1) != 0;
     };
-    bool same = true;
-    for (int i = 0; i < runs.count / edge && same; ++i)
-      for (int y = 1; y < edge && same; ++y) same = row(i, x, y) == row(i, x, 0);
-    const auto set_at = [&](int y) { return [&, y](int i) { return (row(i / edge, x, y) >> i % edge & 1) != 0; }; };
-    if (same)
-      solve(std::integral_constant<int, all>(), 0, set_at(0));
-    else
-      for (int y = 0; y < edge; ++y) solve(std::integral_constant<int, floats>(), y, set_at(y));
-    copy_sheet<components, true>(column, x, memory, buffer.data());
+    solve_line<components, 1>(
+        column, runs, memory, set, [&](int i) { return line * edge + i; }, pointers);
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/sampling/sample_tensors.h
-/// The tensors at many points, in single precision; of cubic fields in the vectors of the processor.
+/// The tensors at many points, in single precision, side by side.
 
 #include <cstddef>
 
@@ -8,7 +8,7 @@
 
 namespace tensorray {
 
-/// Arrays have room for this count of points: vectors are loaded and stored whole.
+/// Arrays have room for this count of points, as callers load and store vectors whole.
 constexpr std::size_t sampled_room(std::size_t count) { return (count + 15) / 16 * 16; }
 
 /// Points of index space. Single precision resolves 1e-7 of the distance from the brick.

@@ -93,14 +93,6 @@ TEST(SampleTensors, AgreesWithTheSamplerOfOnePoint) {
     }
 }
 
-TEST(SampleTensors, APointDoesNotDependOnTheOthers) {
-  const TensorField field = uneven_field({-11, -3, 5}, {9, 14, 30});
-  const std::vector<Vector3d> points = index_points(field, 200);
-  const auto together = sampled(field, points, {0, 0, 1}, 1);
-  for (std::size_t i = 0; i < points.size(); ++i)
-    EXPECT_EQ(sampled(field, {points[i]}, {0, 0, 1}, 1).front(), together[i]) << i;
-}
-
 TEST(BrickPoint, KeepsPositionsInAndBesideTheExtent) {
   const TensorField field = uneven_field({-11, -3, 5}, {9, 14, 30});
   for (const Vector3d& index : index_points(field, 200)) {
