@@ -204,6 +204,26 @@ TEST(Lens, TheSameOnAnyNumberOfThreads) {
   }
 }
 
+/// A picture of one channel in the light of equal bands of a range of flexibilities, or of single ones.
+LensPicture picture_of(const Bench& bench, LensMode mode, const std::vector<double>& flexibilities, bool range,
+                       int count) {
+  LensSettings settings = bench.settings;
+  settings.mode = mode;
+  settings.flexibilities = flexibilities;
+  settings.range = range;
+  std::vector<LensBand> bands;
+  for (int i = 0; i < count; ++i) {
+    const double begin = static_cast<double>(i) / (range ? count : count - 1), end = range ? (i + 1.0) / count : begin;
+    bands.push_back({begin, end, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
+  }
+  const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending,
+                                     {bench.receiver, bench.image, Vector3d::UnitZ()}, settings, Progress());
+  const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+    std::fill(radiances, radiances + (last - first), rgb.x());
+  };
+  return draw_lens(light, bands, radiance, 1, true, Progress());
+}
+
 /// A few bands of a range show what many single wavelengths show together, without steps between them.
 TEST(Lens, ARangeIsAContinuumOfWavelengths) {
   Image edge(256, 256, {"R", "G", "B"});  // White on its left side.
@@ -216,30 +236,13 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
                            return T;
                          }),
               plate_at(1.5, {1, 1}, {64, 16}), {4, 4}, edge);
+  bench.settings.samples = 2;
   for (const LensMode mode : modes) {
-    const auto seen = [&](std::vector<double> flexibilities, bool range, int count) {
-      LensSettings settings;
-      settings.mode = mode;
-      settings.samples = 2;
-      settings.flexibilities = std::move(flexibilities);
-      settings.range = range;
-      std::vector<LensBand> bands;
-      for (int i = 0; i < count; ++i) {
-        const double begin = range ? static_cast<double>(i) / count : static_cast<double>(i) / (count - 1),
-                     end = range ? (i + 1.0) / count : begin;
-        bands.push_back({begin, end, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
-      }
-      const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending,
-                                         {bench.receiver, bench.image, Vector3d::UnitZ()}, settings, Progress());
-      const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
-        std::fill(radiances, radiances + (last - first), rgb.x());
-      };
-      return draw_lens(light, bands, radiance, 1, true, Progress());
-    };
     constexpr int many = 256;
     std::vector<double> each;
     for (int i = 0; i < many; ++i) each.push_back(-0.1 + 0.2 * (i + 0.5) / many);
-    const LensPicture continuum = seen({-0.1, 0.1}, true, 8), single = seen(each, false, many);
+    const LensPicture continuum = picture_of(bench, mode, {-0.1, 0.1}, true, 8),
+                      single = picture_of(bench, mode, each, false, many);
     EXPECT_EQ(continuum.color.plane(0)[5], continuum.radiance.plane(0)[5]);
     int between = 0;
     for (int x = 0; x < 64; ++x) {
@@ -251,23 +254,6 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
     }
     EXPECT_GT(between, 10);
   }
-}
-
-/// A picture of one channel in the light of a range of flexibilities, which has equal bands.
-LensPicture picture_of_range(const Bench& bench, LensMode mode, const std::vector<double>& ends, int count) {
-  LensSettings settings = bench.settings;
-  settings.mode = mode;
-  settings.flexibilities = ends;
-  settings.range = true;
-  std::vector<LensBand> bands;
-  for (int i = 0; i < count; ++i)
-    bands.push_back({static_cast<double>(i) / count, (i + 1.0) / count, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
-  const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending,
-                                     {bench.receiver, bench.image, Vector3d::UnitZ()}, settings, Progress());
-  const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
-    std::fill(radiances, radiances + (last - first), rgb.x());
-  };
-  return draw_lens(light, bands, radiance, 1, true, Progress());
 }
 
 /// The edge of white light that turns aside lies elsewhere in each wavelength: a pixel has the part of the spectrum
@@ -283,7 +269,7 @@ TEST(Lens, AtATearPixelsHaveTheirPartOfEachBand) {
   };
   Bench bench(constant_field(T), plate_at(1.5, {3, 3}, {96, 96}), {3, 3}, uniform(1), Wrap::clamp);
   constexpr int count = 3;
-  const LensPicture seen = picture_of_range(bench, LensMode::scatter, {least, most}, count);
+  const LensPicture seen = picture_of(bench, LensMode::scatter, {least, most}, true, count);
   int partly = 0;
   for (int row = 0; row < 96; ++row) {
     const double y = 1.5 - (row + 0.5) * pixel;
@@ -318,8 +304,8 @@ TEST(Lens, PixelsAreTheMeanOfTheirPartsWhereTheMapBends) {
   coarse.settings.samples = n;
   coarse.bending = fine.bending = settings_of(BendingMethod::splitting, 0.5);
   // (Not of scatter, whose gaps at tears are a quarter of a pixel wide: they differ with the pixels.)
-  const LensPicture seen = picture_of_range(coarse, LensMode::gather, {0.05, 0.15}, 4),
-                    parts = picture_of_range(fine, LensMode::gather, {0.05, 0.15}, 4);
+  const LensPicture seen = picture_of(coarse, LensMode::gather, {0.05, 0.15}, true, 4),
+                    parts = picture_of(fine, LensMode::gather, {0.05, 0.15}, true, 4);
   double sum = 0;
   for (int y = 0; y < size; ++y)
     for (int x = 0; x < size; ++x) {

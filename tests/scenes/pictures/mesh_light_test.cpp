@@ -73,9 +73,8 @@ TEST_F(MeshLight, IsThatOfAHistogramInExampleScenes) {
     const char* change;
   };
   for (const Case& each :
-       {Case{"helix", 64, ""}, Case{"vortex", 64, ""}, Case{"point_load_photons", 64, ""},
-        Case{"two_point_load", 64, ""}, Case{"hemisphere_photons_front", 64, ""},
-        Case{"hemisphere_photons_side", 64, ""}, Case{"hemisphere_photons_front", 96, "field.scale=0.675"}}) {
+       {Case{"vortex", 64, ""}, Case{"point_load_photons", 64, ""}, Case{"hemisphere_photons_side", 64, ""},
+        Case{"hemisphere_photons_front", 96, "field.scale=0.675"}}) {
     const auto blocks_of = [&](const char* kind) {
       Settings settings{fmt::format("receiver.resolution=[{0},{0}]", each.resolution),
                         R"(light.wavelengths={"min":549,"max":551,"count":1})",

@@ -11,16 +11,6 @@ namespace {
 
 using namespace test;
 
-TEST_F(Paths, APictureWithEveryChannel) {
-  const Image image = render({}, {"out.png"});
-  EXPECT_THAT(image.channels, ::testing::UnorderedElementsAreArray(all_channels));
-  EXPECT_EQ(image.width, 24);
-  EXPECT_EQ(image.height, 16);
-  const Image shown = read_image(in_folder("out.png"));
-  EXPECT_EQ(shown.width, 24);
-  EXPECT_LT(*std::min_element(shown.pixels.begin(), shown.pixels.end()), 0.7f) << "something is on the white ground";
-}
-
 TEST_F(Paths, AuxiliaryPlanesSayWhatTheyShould) {
   // Seen along y: first the tubes and the box, then only the tubes.
   const Settings settings{transparent, "camera.projection=orthographic", "camera.direction=[0,1,0]"};
@@ -43,32 +33,16 @@ TEST_F(Paths, AuxiliaryPlanesSayWhatTheyShould) {
   Settings alone = settings;
   alone.push_back(without_box);
   const Image image = render(alone);
-  const std::vector<float> alpha = channel(image, "A"), depth = channel(image, "Z"), path = channel(image, "path"),
-                           length = channel(image, "length"), variance = channel(image, "variance");
-  std::set<float> ids;
-  double normal_lengths = 0, tubes = 0;
+  const std::vector<float> alpha = channel(image, "A"), path = channel(image, "path"),
+                           length = channel(image, "length"), tube_force = channel(image, "force"),
+                           normal = channel(image, "normal.Y");
   for (std::size_t i = 0; i < alpha.size(); ++i) {
     EXPECT_EQ(path[i] >= 0, alpha[i] > 0) << i;
-    EXPECT_TRUE(depth[i] > 0 || alpha[i] == 0) << i;
-    EXPECT_GE(length[i], 0);
+    EXPECT_EQ(tube_force[i] > 0, alpha[i] > 0) << i;
+    EXPECT_EQ(normal[i]<0, alpha[i]> 0) << "towards the viewer";
     EXPECT_LT(length[i], 4);
-    EXPECT_GE(variance[i], 0);
-    EXPECT_EQ(channel(image, "force")[i] > 0, alpha[i] > 0) << i;
-    if (alpha[i] == 0) continue;
-    ids.insert(path[i]);
-    const Eigen::Vector3f normal(channel(image, "normal.X")[i], channel(image, "normal.Y")[i],
-                                 channel(image, "normal.Z")[i]);
-    EXPECT_LE(normal.norm(), 1.0001f);
-    EXPECT_LT(normal.y(), 0) << "towards the viewer";
-    normal_lengths += static_cast<double>(normal.norm());
-    ++tubes;
-    for (const char* name : {"albedo.R", "albedo.G", "albedo.B"}) {
-      EXPECT_GE(channel(image, name)[i], 0);
-      EXPECT_LE(channel(image, name)[i], 1);
-    }
   }
-  EXPECT_GE(ids.size(), 4u);
-  EXPECT_GT(normal_lengths / tubes, 0.7) << "means of unit vectors";
+  EXPECT_GE(std::set<float>(path.begin(), path.end()).size(), 5u) << "four paths, and none";
   EXPECT_GT(greatest(length), 1);
 }
 
