@@ -81,5 +81,34 @@ TEST(Structure, LibrariesNeitherPrintNorExit) {
       EXPECT_FALSE(is_library(line) && std::regex_search(line.text, forbidden)) << line.file << ": " << line.text;
 }
 
+/// Eq. 5 needs the tensor at the position of a ray: from a sampler or, in packets, from the bricks.
+TEST(Structure, OnlyBendingKnowsTheRule) {
+  const std::regex tensor_at_a_point(R"(\b(TensorSampler|TensorBrick)\b|\bbrick\()");
+  const std::set<std::string> rooms{"tracing/kernels", "tracing/steps", "tracing/trace"};
+  std::set<std::string> readers;
+  for (const Line& line : lines_of("tracing"))
+    if (std::regex_search(line.text, tensor_at_a_point)) {
+      EXPECT_TRUE(rooms.count(line.folder())) << line.file << ": " << line.text;
+      readers.insert(line.folder());
+    }
+  // Both tracers must use the names that this test looks for.
+  EXPECT_TRUE(readers.count("tracing/kernels") && readers.count("tracing/steps"));
+}
+
+/// Of a method, what loads and calls sees the scene; what computes does not.
+TEST(Structure, WhatComputesNeverSeesAScene) {
+  const std::regex includes("#include \"scenes/(scene/scene|description/description)\\.h\"");
+  const std::regex computes(
+      "/(lens|lens_map|lens_obstacles|lens_shading|lens_view|fluence|photon_chunks|photon_distribution|"
+      "band_interpolation|field_region|stretch)\\.(h|cpp)$");
+  std::size_t found = 0;
+  for (const Line& line : lines_of("integrators")) {
+    if (!std::regex_search(line.file, computes)) continue;
+    ++found;
+    EXPECT_FALSE(std::regex_search(line.text, includes)) << line.file << ": " << line.text;
+  }
+  EXPECT_GT(found, 1000u);
+}
+
 }  // namespace
 }  // namespace tensorray
