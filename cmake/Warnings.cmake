@@ -62,16 +62,14 @@ function(tensorray_relocatable name)
 endfunction()
 
 # Half of the time to compile most files is the headers that nearly all of them include: these are compiled once, for
-# relocatable code.
+# relocatable code. With GCC they bring their level of optimisation to all that uses them, so that `scenes` has its own.
 function(tensorray_common_headers name)
   set(headers <Eigen/Geometry> <algorithm> <filesystem> <functional> <map> <memory> <optional> <string> <variant>
               <vector>)
   if(name STREQUAL base)
     target_precompile_headers(base PRIVATE ${headers})
-  elseif(name STREQUAL scenes)
-    target_precompile_headers(scenes PRIVATE ${headers} <fmt/format.h> <nlohmann/json.hpp>)
-  elseif(name STREQUAL integrators)
-    target_precompile_headers(integrators REUSE_FROM scenes)
+  elseif(name MATCHES "^(scenes|integrators)$")
+    target_precompile_headers(${name} PRIVATE ${headers} <fmt/format.h> <nlohmann/json.hpp>)
   else()
     target_precompile_headers(${name} REUSE_FROM base)
   endif()
