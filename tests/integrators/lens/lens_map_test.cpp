@@ -73,14 +73,6 @@ TensorField spreading_field(double k) {
   });
 }
 
-TensorField swirling_field(double rate) {
-  return cube_field(9, [rate](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T.col(2) << -rate * p.y(), rate * p.x(), 0;
-    return T;
-  });
-}
-
 /// Light that turns at `rate` per length through a slab of `depth`, then goes straight over `distance`.
 struct Arc {
   double aside = 0, length = 0;
@@ -240,40 +232,6 @@ TEST(LensMap, LandingsAreOrderedByStartThenFlexibility) {
   EXPECT_GE(counts.tensor_samples + 6, sum.tensor_samples);
   EXPECT_GT(counts.ray_steps, 0u);
   EXPECT_LT((landings[3].at - starts[1]).norm(), single_precision);  // s = 0: straight.
-}
-
-/// Gathers from `receiver` to `image` with −s, as the lens does, and follows the reversed light with +s.
-/// @return the largest distance of a return from its start, in voxels; `count` becomes the number of rays that arrived.
-double worst_return(const TensorField& field, double s, double tolerance, int& count) {
-  const Vector3d direction = Vector3d(0.1, -0.05, -1).normalized();
-  const Plate receiver = plane_at(-1.5), image = plane_at(1.5);
-  Surfaces surfaces = surfaces_of(field);
-  surfaces.plate = image;
-  surfaces.plate->size = {40, 40};
-  const Geometry to_image(surfaces);
-  surfaces.plate = receiver;
-  surfaces.plate->size = {40, 40};
-  const Geometry to_receiver(surfaces);
-  BendingSettings settings;
-  settings.method = BendingMethod::dopri5;
-  settings.tolerance = tolerance;
-  const LensMap gather = make_map(field, receiver, image, -direction, settings);
-  double worst = 0;
-  count = 0;
-  for (int y = 0; y < 8; ++y)
-    for (int x = 0; x < 8; ++x) {
-      const Vector2d start((x - 3.5) / 5, (y - 3.5) / 5);
-      const Ray there = trace_one(field, to_image, settings, plane_point(receiver, start), -direction, -s);
-      if (there.end != RayEnd::plate) continue;
-      const Ray back = trace_one(field, to_receiver, settings, there.position, -there.direction, s);
-      EXPECT_EQ(back.end, RayEnd::plate);
-      worst = std::max(worst, (back.position - plane_point(receiver, start)).norm() / voxel_size(field));
-      const LensLanding landing = land(gather, start, -s);
-      // With differentials, tensors are rounded differently, and error control may accept other steps.
-      EXPECT_LT((plane_point(image, landing.at) - there.position).norm(), 1e-5 * voxel_size(field));
-      ++count;
-    }
-  return worst;
 }
 
 }  // namespace

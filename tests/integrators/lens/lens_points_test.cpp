@@ -124,15 +124,5 @@ TEST(Lens, ThreeSheetsBeyondTheFocus) {
   }
 }
 
-double largest_difference(const LensPicture& a, const LensPicture& b) {
-  double largest = 0;
-  for (std::size_t i = 0; i < a.points.size(); ++i) {
-    EXPECT_EQ(a.points[i].end, LensEnd::image);
-    EXPECT_EQ(b.points[i].end, LensEnd::image);
-    largest = std::max(largest, (a.points[i].st - b.points[i].st).norm());
-  }
-  return largest;
-}
-
 }  // namespace
 }  // namespace tensorray

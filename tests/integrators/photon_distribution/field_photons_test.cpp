@@ -83,18 +83,6 @@ RayBatch sun_rays(double& power) {
   return rays;
 }
 
-/// Rays of the point, the lower half of them.
-RayBatch point_rays(double& power) {
-  constexpr int count = 120000;
-  RayBatch rays;
-  for (int i = 0; i < count; ++i) {
-    const double z = -random_uniform(2, i, 0), turn = 2 * pi * random_uniform(2, i, 1), across = std::sqrt(1 - z * z);
-    rays.add(point_within.position, {across * std::cos(turn), across * std::sin(turn), z}, flexibility);
-  }
-  power = 2 * pi / count;
-  return rays;
-}
-
 /// The same by rays one by one in double precision, if power is conserved and if radiance is.
 struct OnFloor {
   std::vector<double> power = std::vector<double>(64), radiance = power;

@@ -78,20 +78,6 @@ TEST_F(Lens, LightWithoutAlphaIsKept) {
   EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("glow.exr: 1 pixels have values that are not finite")));
 }
 
-/// The greatest difference between the chromaticity of a pixel and that of the sum of all pixels.
-double colour_range(const Image& image) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  std::vector<Eigen::Vector3d> pixels;
-  for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size()) {
-    pixels.push_back(Eigen::Vector3f(&image.pixels[i]).cast<double>());
-    sum += pixels.back();
-  }
-  double range = 0;
-  for (const Eigen::Vector3d& pixel : pixels)
-    if (pixel.norm() > 0.05) range = std::max(range, (pixel.normalized() - sum.normalized()).norm());
-  return range;
-}
-
 TEST_F(Lens, DepthsStandSideBySideAndLessOfTheVolumeBendsLess) {
   // The field turns light about z at a constant rate. A longer path is deflected more.
   write("scene.json", small_lens(R"("image": "grid", "image_plane": {"depth": [0, 0.25, 0.5, 0.75, 0.95]})",

@@ -42,17 +42,6 @@ TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
   }
 }
 
-/// The mean light of blocks of 4 × 4 pixels.
-std::vector<double> block_means(const Image& image) {
-  const auto channel = std::find(image.channels.begin(), image.channels.end(), "G") - image.channels.begin();
-  const int columns = image.width / 4, rows = image.height / 4;
-  std::vector<double> means(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  for (int y = 0; y < 4 * rows; ++y)
-    for (int x = 0; x < 4 * columns; ++x)
-      means[static_cast<std::size_t>(y / 4) * columns + x / 4] += image.pixel(x, y)[channel] / 16;
-  return means;
-}
-
 /// The magnification is that of the displacement, from pixel to pixel.
 TEST_F(MeshLight, TheMapsChannelsDescribeOneMap) {
   const Image image = render({});

@@ -152,23 +152,6 @@ TEST(Bending, TheScaleIsAFactorOnTheFlexibility) {
     }
 }
 
-/// The slope of log(error) over log(step).
-double observed_order(const std::vector<double>& errors) {
-  return std::log2(errors.front() / errors.back()) / static_cast<double>(errors.size() - 1);
-}
-
-std::vector<double> errors_of(const TensorField& field, BendingMethod method, int coarsest, int refinements) {
-  const Vector3d P(-0.35, 0.25, -0.6), V = Vector3d(0.15, 0.2, 1).normalized();
-  const double length = 4;  // In voxels.
-  const auto end = [&](BendingMethod by, int steps) {
-    return trace_steps(field, settings_of(by, length / steps), steps, P, V, 0.6).position;
-  };
-  const Vector3d exact = end(BendingMethod::rk4, 1 << 14);
-  std::vector<double> errors;
-  for (int i = 0; i < refinements; ++i) errors.push_back((end(method, coarsest << i) - exact).norm());
-  return errors;
-}
-
 TEST(Bending, EntryExitAndPlateKeepTheOrder) {
   const TensorField field = cube_field(9, linear_tensor);
   for (const double plate_at : {1.5, 0.37}) {  // Behind the volume, and inside.
