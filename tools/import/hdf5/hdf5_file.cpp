@@ -68,6 +68,11 @@ std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
   }
 }
 
+/// @param file  -1: there is no such attribute.
+Id open_attribute(hid_t file, const std::string& object, const std::string& attribute) {
+  return {file < 0 ? -1 : H5Aopen_by_name(file, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose};
+}
+
 }  // namespace
 
 struct Hdf5File::Handle {
@@ -157,10 +162,7 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const H
 }
 
 std::vector<double> Hdf5File::numbers(const std::string& object, const std::string& attribute) const {
-  const Id id(has_attribute(object, attribute)
-                  ? H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT)
-                  : -1,
-              H5Aclose);
+  const Id id = open_attribute(has_attribute(object, attribute) ? hid_t{file_->id} : -1, object, attribute);
   const Id space(id < 0 ? -1 : H5Aget_space(id), H5Sclose);
   const hssize_t count = space < 0 ? 0 : H5Sget_simple_extent_npoints(space);
   std::vector<double> values(static_cast<std::size_t>(std::clamp<hssize_t>(count, 0, 64)));
@@ -170,10 +172,7 @@ std::vector<double> Hdf5File::numbers(const std::string& object, const std::stri
 }
 
 std::string Hdf5File::text(const std::string& object, const std::string& attribute) const {
-  const Id id(has_attribute(object, attribute)
-                  ? H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT)
-                  : -1,
-              H5Aclose);
+  const Id id = open_attribute(has_attribute(object, attribute) ? hid_t{file_->id} : -1, object, attribute);
   const Id type(id < 0 ? -1 : H5Aget_type(id), H5Tclose);
   const bool is_text = type >= 0 && H5Tget_class(type) == H5T_STRING;
   if (is_text && H5Tis_variable_str(type) > 0) {
