@@ -137,10 +137,9 @@ void set_thickness(vtkImageData& image, double thickness) {
   bool is_flat = false;
   for (int axis = 0; axis < 3; ++axis) {
     if (image.GetDimensions()[axis] != 1) continue;
-    double spacing[3];
-    image.GetSpacing(spacing);
+    Eigen::Vector3d spacing(image.GetSpacing());
     spacing[axis] = thickness;
-    image.SetSpacing(spacing);
+    image.SetSpacing(spacing.data());
     is_flat = true;
   }
   if (!is_flat) throw std::invalid_argument("is not flat: leave --thickness out");

@@ -17,6 +17,7 @@
 #include <zlib.h>
 
 #include "base/errors.h"
+#include "base/text/parse_number.h"
 
 namespace tensorray {
 namespace {
@@ -24,10 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 
 std::optional<double> time_value(const std::string& name) {
-  char* end = nullptr;
-  const double value = std::strtod(name.c_str(), &end);
-  if (name.empty() || *end != '\0' || !(std::isdigit(static_cast<unsigned char>(name[0])) || name[0] == '-')) return {};
-  return value;
+  const bool begins = !name.empty() && (std::isdigit(static_cast<unsigned char>(name[0])) || name[0] == '-');
+  return begins ? parse_number(name) : std::nullopt;
 }
 
 /// The number after "processor", or the first one of collated files in "processorsN" and "processorsN_FIRST-LAST".

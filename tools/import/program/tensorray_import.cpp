@@ -94,11 +94,9 @@ ImportSettings settings_of(const ImportOptions& options) {
 }
 
 void print_lattice(const LatticeReport& report) {
-  const auto percent = [&](std::size_t count) {
-    return 100.0 * static_cast<double>(count) / static_cast<double>(report.voxels);
-  };
+  const double percent = 100.0 * static_cast<double>(report.active) / static_cast<double>(report.voxels);
   tell_made(fmt::format("  voxels as they were: {} of {} active ({:.1f}%); {} background, {} not finite", report.active,
-                        report.voxels, percent(report.active), report.background, report.non_finite));
+                        report.voxels, percent, report.background, report.non_finite));
   for (const std::string& note : report.notes) tell_made(fmt::format("  {}", note));
   if (report.negative > max_negative)
     tell({fmt::format(

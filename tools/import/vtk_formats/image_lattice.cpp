@@ -28,33 +28,27 @@ struct Source {
 };
 
 Eigen::Vector3i size_of(vtkImageData& image, bool of_cells) {
-  Eigen::Vector3i size;
-  image.GetDimensions(size.data());
+  Eigen::Vector3i size(image.GetDimensions());
   if (of_cells) size = (size.array() - 1).max(1);  // along an axis with one point, VTK's cells are flat
   return size;
 }
 
 /// The edges of a voxel, as columns. If a flat image has no thickness, its thinnest other edge is used.
 Eigen::Matrix3d edges_of(vtkImageData& image) {
-  Eigen::Vector3d spacing;
-  image.GetSpacing(spacing.data());
+  Eigen::Vector3d spacing(image.GetSpacing());
   double thinnest = std::numeric_limits<double>::infinity();
   for (const double edge : spacing)
     if (edge != 0) thinnest = std::min(thinnest, std::abs(edge));
-  Eigen::Vector3i size;
-  image.GetDimensions(size.data());
   for (int axis = 0; axis < 3; ++axis)
-    if (spacing[axis] == 0 && size[axis] == 1) spacing[axis] = thinnest;
+    if (spacing[axis] == 0 && image.GetDimensions()[axis] == 1) spacing[axis] = thinnest;
   const double* const direction = image.GetDirectionMatrix()->GetData();
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(direction) * spacing.asDiagonal();
 }
 
 Eigen::Affine3d to_world_of(vtkImageData& image, bool of_cells) {
-  Eigen::Vector3i dimensions;
-  image.GetDimensions(dimensions.data());
   Eigen::Vector3d first;
   for (int axis = 0; axis < 3; ++axis)
-    first[axis] = image.GetExtent()[2 * axis] + (of_cells && dimensions[axis] > 1 ? 0.5 : 0.0);
+    first[axis] = image.GetExtent()[2 * axis] + (of_cells && image.GetDimensions()[axis] > 1 ? 0.5 : 0.0);
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
   to_world.linear() = edges_of(image);
   to_world.translation() = Eigen::Map<const Eigen::Vector3d>(image.GetOrigin()) + to_world.linear() * first;
