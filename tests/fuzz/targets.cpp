@@ -28,7 +28,6 @@
 #include "tests/fuzz/view_targets.h"
 #include "tools/import/cases/ensight.h"
 #include "tools/import/hdf5/xdmf_document.h"
-#include "tools/import/hdf5/xdmf_values.h"
 #include "tools/import/lattice_files/lattice_files.h"
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk_formats/netcdf_end.h"

@@ -99,7 +99,7 @@ const std::vector<Room> rooms{
     {"tools/import/sampling", {"tools/import/meshes", "volumes/*"}},
     {"tools/import/vtk", {"tools/import/lattices", "volumes/*"}},
     {"tools/import/vtk_formats", {"tools/import/lattices", "tools/import/vtk", "volumes/*"}},
-    {"tools/import/cases", {"tools/import/vtk", "volumes/*"}},
+    {"tools/import/cases", {"tools/import/vtk", "tools/import/vtk_formats", "volumes/*"}},
     {"tools/import/hdf5", {"tools/import/vtk", "volumes/*"}},
     {"tools/import/vtk_source",
      {"tools/import/cases", "tools/import/hdf5", "tools/import/vtk", "tools/import/vtk_formats", "volumes/*"}},

@@ -1,7 +1,6 @@
 #include "tools/import/import_file.h"
 
 #include <algorithm>
-#include <limits>
 #include <new>
 #include <stdexcept>
 #include <utility>
@@ -15,6 +14,7 @@
 #include <vtkDataSet.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
+#include <vtkObject.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 
@@ -22,11 +22,10 @@
 #include "base/text/text.h"
 #include "tools/import/cases/plot3d.h"
 #include "tools/import/lattice_files/lattice_files.h"
-#include "tools/import/lattices/component_names.h"
-#include "tools/import/meshes/component_arrays.h"
+#include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/flat_mesh.h"
 #include "tools/import/meshes/mesh_boundary.h"
-#include "tools/import/vtk/vtk_messages.h"
+#include "tools/import/meshes/mesh_tensors.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
@@ -37,16 +36,17 @@ namespace {
 using OpenLattice = Lattice (*)(const std::filesystem::path&);
 
 OpenLattice lattice_reader(const std::filesystem::path& path) {
+  const std::pair<OpenLattice, std::vector<const char*>> readers[] = {
+      {open_nrrd, {".nrrd", ".nhdr"}},
+      {open_nifti, {".nii", ".nii.gz", ".hdr", ".hdr.gz", ".img", ".img.gz"}},
+      {open_metaimage, {".mha", ".mhd"}},
+      {open_mrtrix, {".mif", ".mif.gz", ".mih"}},
+      {open_npy, {".npy"}}};
   const std::string name = lower_case(path.filename().string());
-  for (const char* ending : {".nrrd", ".nhdr"})
-    if (ends_with(name, ending)) return open_nrrd;
-  for (const char* ending : {".nii", ".nii.gz", ".hdr", ".hdr.gz", ".img", ".img.gz"})
-    if (ends_with(name, ending)) return open_nifti;
-  for (const char* ending : {".mha", ".mhd"})
-    if (ends_with(name, ending)) return open_metaimage;
-  for (const char* ending : {".mif", ".mif.gz", ".mih"})
-    if (ends_with(name, ending)) return open_mrtrix;
-  return ends_with(name, ".npy") ? open_npy : nullptr;
+  for (const auto& [reader, endings] : readers)
+    for (const char* ending : endings)
+      if (ends_with(name, ending)) return reader;
+  return nullptr;
 }
 
 /// Whether the user asks for voxels of a size or a number; the first kind of a resolution is none.
@@ -88,6 +88,14 @@ TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings
   return grid;
 }
 
+/// Until it is destroyed, drops VTK's errors and warnings: it reports every flat cell. Several threads may use VTK.
+struct SilentVtk {
+  const int before = vtkObject::GetGlobalWarningDisplay();
+
+  SilentVtk() { vtkObject::GlobalWarningDisplayOff(); }
+  ~SilentVtk() { vtkObject::SetGlobalWarningDisplay(before); }
+};
+
 TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportSettings& settings,
                        const Progress& progress, ImportReport& report) {
   const SilentVtk silent;
@@ -106,14 +114,6 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
   return grid;
 }
 
-/// Of the bounds that the user gives, in the plane of a flat mesh.
-double longest_edge(const ImportSettings& settings, const FlatMesh& flat) {
-  if (!settings.sampling.bounds) return std::numeric_limits<double>::infinity();
-  Eigen::Vector3d edges = settings.sampling.bounds->sizes();
-  edges[flat.axis] = 0;
-  return edges.maxCoeff();
-}
-
 /// Makes a slab of a flat mesh: one voxel across its plane.
 vtkSmartPointer<vtkDataSet> slab_of_flat(vtkSmartPointer<vtkDataSet> data, ImportSettings& settings,
                                          ImportReport& report) {
@@ -123,7 +123,12 @@ vtkSmartPointer<vtkDataSet> slab_of_flat(vtkSmartPointer<vtkDataSet> data, Impor
   if (!settings.boundary.empty()) throw std::invalid_argument("is flat, and has no body: leave --boundary out");
   report.thickness = settings.thickness.value_or(flat->edge);
   settings.sampling.flat_axis = flat->axis;
-  if (!wants_sampling(settings)) settings.sampling.resolution = std::min(flat->edge, longest_edge(settings, *flat));
+  if (!wants_sampling(settings)) {
+    Eigen::Vector3d edges = Eigen::Vector3d::Constant(flat->edge);
+    if (settings.sampling.bounds) edges = settings.sampling.bounds->sizes();
+    edges[flat->axis] = 0;
+    settings.sampling.resolution = std::min(flat->edge, edges.maxCoeff());
+  }
   return slab_of(*data, *flat, report.thickness);
 }
 
@@ -132,10 +137,9 @@ void set_thickness(vtkImageData& image, double thickness) {
   bool is_flat = false;
   for (int axis = 0; axis < 3; ++axis) {
     if (image.GetDimensions()[axis] != 1) continue;
-    double spacing[3];
-    image.GetSpacing(spacing);
+    Eigen::Vector3d spacing(image.GetSpacing());
     spacing[axis] = thickness;
-    image.SetSpacing(spacing);
+    image.SetSpacing(spacing.data());
     is_flat = true;
   }
   if (!is_flat) throw std::invalid_argument("is not flat: leave --thickness out");
@@ -151,7 +155,7 @@ bool is_flat_across_z(vtkImageData& image) {
 ArrayChoice chosen_array(vtkDataSet& data, const ImportSettings& settings, bool is_flat) {
   if (is_array_list(data, settings.array)) return join_arrays(data, settings.array, settings.take, is_flat);
   const ArrayChoice array = choose_array(data, settings.array, settings.take, settings.cell_values);
-  vtkDataSetAttributes& attributes = *data.GetAttributes(array.of_cells ? vtkDataObject::CELL : vtkDataObject::POINT);
+  vtkDataSetAttributes& attributes = attributes_of(data, array.of_cells);
   if (settings.take == Take::tensor) attributes.AddArray(in_known_order(*attributes.GetArray(array.name.c_str())));
   return array;
 }
@@ -175,9 +179,7 @@ TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, ImportSettings sett
   const ArrayChoice array = chosen_array(*data, settings, is_flat);
   if (!image || wants_sampling(settings)) return import_mesh(*data, array, settings, progress, report);
   data = nullptr;  // Leave the lattice as the only owner of the numbers, so that it can free them.
-  vtkDataSetAttributes* attributes = array.of_cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData())
-                                                    : static_cast<vtkDataSetAttributes*>(image->GetPointData());
-  vtkSmartPointer<vtkDataArray> values = attributes->GetArray(array.name.c_str());
+  vtkSmartPointer<vtkDataArray> values = attributes_of(*image, array.of_cells).GetArray(array.name.c_str());
   std::optional<TensorOrder> order;
   if (settings.take == Take::tensor) order = order_in(*values, settings.order);
   Lattice lattice = lattice_of(std::move(image), std::move(values), array.of_cells);
@@ -202,9 +204,8 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   if (open && settings.thickness) throw std::invalid_argument("has voxels of its own: leave --thickness out");
   if (!has_steps && settings.step.value_or(0) > 0)
     throw std::invalid_argument("has one step of time; leave --steps out");
-  if (settings.files.size() == 2) {
+  if (settings.files.size() == 2)
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
-  }
   if (!open) return import_data_set(read_vtk_source(file, settings.step), settings, progress, report);
   if (open == open_npy) return import_lattice(placed(open(file), settings), settings, report);
   if (wants_sampling(settings))
@@ -237,9 +238,8 @@ void require_place(const std::filesystem::path& file, const TensorGrid& grid) {
 }
 
 std::string tensor_name(const std::string& array, Take take) {
-  const std::string base = array.empty() ? "tensor" : array;
-  if (take == Take::tensor) return base;
-  return base + (take == Take::gradient ? "_gradient" : "_strain");
+  const char* const ending = take == Take::tensor ? "" : take == Take::gradient ? "_gradient" : "_strain";
+  return (array.empty() ? "tensor" : array) + ending;
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 #pragma once
 /// @file tools/import/import_file.h
 /// Reads tensors from files of other programs: finds the format and calls its reader. Two ways lead to a TensorGrid.
-/// The voxels of a Lattice are kept. A mesh is a VTK data set whose cells are checked (vtk_geometry.h): it gets tensors
-/// at its points or cells (mesh_tensors.h), and is sampled at voxels (mesh_sampling.h).
+/// The voxels of a Lattice are kept. A mesh is a VTK data set whose cells are checked (vtk_data_sets.h): it gets
+/// tensors at its points or cells (mesh_tensors.h), and is sampled at voxels (mesh_sampling.h).
 
 #include <cstddef>
 #include <filesystem>
@@ -19,8 +19,7 @@ namespace tensorray {
 struct ImportSettings {
   /// One file. For PLOT3D two: the grid file and the q file.
   std::vector<std::filesystem::path> files;
-  std::string
-      array;  ///< Name of the array, or a list of its components (component_arrays.h); empty: the only suitable one.
+  std::string array;  ///< Its name, or a list of its components (mesh_tensors.h); empty: the only suitable one.
   Take take = Take::tensor;
   CellValues cell_values = CellValues::linear;  ///< Of tensors at the cells of a mesh.
   std::optional<TensorOrder> order;             ///< Order of six components, where the file does not state it.

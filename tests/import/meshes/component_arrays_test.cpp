@@ -1,9 +1,8 @@
-#include "tools/import/meshes/component_arrays.h"
-
 #include <gmock/gmock.h>
 #include <vtkCellData.h>
 
 #include "tests/import/mesh_fixtures.h"
+#include "tools/import/meshes/mesh_tensors.h"
 
 namespace tensorray {
 namespace {

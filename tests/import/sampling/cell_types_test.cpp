@@ -11,7 +11,7 @@
 #include "tools/import/meshes/mesh_tensors.h"
 #include "tools/import/sampling/cell_parts.h"
 #include "tools/import/sampling/mesh_sampling.h"
-#include "tools/import/vtk/vtk_geometry.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
@@ -20,6 +21,8 @@
 #include "base/errors.h"
 #include "base/text/short_lines.h"
 #include "base/text/text.h"
+#include "tools/import/vtk/vtk_data_sets.h"
+#include "tools/import/vtk_formats/array_names.h"
 
 namespace tensorray {
 namespace {
@@ -68,9 +71,7 @@ std::vector<Entry> entries_of(const fs::path& path) {
 
 Numbers numbers_in(const std::string& text) {
   std::istringstream stream(text);
-  Numbers numbers;
-  for (double number; stream >> number;) numbers.push_back(number);
-  return numbers;
+  return {std::istream_iterator<double>(stream), {}};
 }
 
 std::map<int, TimeSet> time_sets(const std::vector<Entry>& entries) {
@@ -111,8 +112,7 @@ int take_set(std::vector<std::string>& words) {
 /// The file of an entry "[TIME SET] [FILE SET] [DESCRIPTION] FILE"; empty if its name is not known.
 fs::path file_of(const Entry& entry, const std::map<int, TimeSet>& sets, float time) {
   std::istringstream stream(entry.value);
-  std::vector<std::string> words;
-  for (std::string word; stream >> word;) words.push_back(word);
+  std::vector<std::string> words{std::istream_iterator<std::string>(stream), {}};
   const int set = take_set(words);
   const bool has_description = entry.section == "VARIABLE";
   if (words.size() < (has_description ? 2u : 1u) || entry.value.find('"') != std::string::npos) return {};
@@ -171,7 +171,6 @@ std::set<std::uint64_t> sizes_in(vtkDataObject& read) {
   return sizes;
 }
 
-/// Whether a file has a text in its first lines.
 bool begins_with(const fs::path& path, const std::string& text) {
   std::string head(240, '\0');
   std::ifstream(path, std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size()));
@@ -257,6 +256,7 @@ vtkSmartPointer<vtkDataObject> read_step(const fs::path& path, std::size_t step)
   reader->Update();
   const vtkSmartPointer<vtkDataObject> result = reader->GetOutputDataObject(0);
   if (result) check_ends(given, *result);
+  for (vtkDataSet* const part : data_sets_in(result)) name_symmetric_components(*part);
   return result;
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/import/vtk/mesh_file.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
 
@@ -26,7 +26,7 @@ struct EnSightCase {
 /// @throw std::runtime_error: the case has a line that is no part of such a file; or names the file that is missing.
 EnSightCase ensight_case(const std::filesystem::path& path, std::size_t step);
 
-/// All parts, with all variables. Symmetric tensors are in VTK's order.
+/// All parts, with all variables. The components of symmetric tensors have names.
 MeshFile open_ensight(const std::filesystem::path& path);
 
 }  // namespace tensorray

@@ -13,7 +13,7 @@
 #include <vtkStructuredGrid.h>
 
 #include "base/errors.h"
-#include "tools/import/vtk/vtk_geometry.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk/vtk_messages.h"
 
 namespace tensorray {

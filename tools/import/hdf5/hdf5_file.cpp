@@ -31,28 +31,6 @@ class Id {
   herr_t (*close_)(hid_t);
 };
 
-/// Stops HDF5 from printing its errors.
-void silence() {
-  static const bool once = [] { return H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr) >= 0; }();
-  (void)once;
-}
-
-/// Whether each group of a path is there: H5Lexists fails on others.
-bool exists(hid_t file, const std::string& name) {
-  for (std::size_t end = name.find('/', 1);; end = name.find('/', end + 1)) {
-    const std::string part = name.substr(0, end);
-    if (part != "/" && !part.empty() && H5Lexists(file, part.c_str(), H5P_DEFAULT) <= 0) return false;
-    if (end == std::string::npos) return true;
-  }
-}
-
-std::vector<hsize_t> extents_of(hid_t space) {
-  const int rank = H5Sget_simple_extent_ndims(space);
-  std::vector<hsize_t> extents(static_cast<std::size_t>(std::max(0, rank)));
-  if (rank > 0) H5Sget_simple_extent_dims(space, extents.data(), nullptr);
-  return extents;
-}
-
 /// An array for numbers of a type, and the type in memory; null if it is none of numbers.
 std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
   switch (H5Tget_class(type)) {
@@ -68,6 +46,11 @@ std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
   }
 }
 
+/// @param file  -1: there is no such attribute.
+Id open_attribute(hid_t file, const std::string& object, const std::string& attribute) {
+  return {file < 0 ? -1 : H5Aopen_by_name(file, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose};
+}
+
 }  // namespace
 
 struct Hdf5File::Handle {
@@ -75,7 +58,7 @@ struct Hdf5File::Handle {
 };
 
 Hdf5File::Hdf5File(const std::filesystem::path& path) : path_(path) {
-  silence();
+  [[maybe_unused]] static const herr_t silenced = H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   if (!std::filesystem::is_regular_file(path)) tensorray::fail(path, "is missing; copy it there too");
   file_.reset(new Handle{{H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose}});
   if (file_->id < 0) fail("is no HDF5 file, or cut off; copy or write it again");
@@ -85,7 +68,13 @@ Hdf5File::~Hdf5File() = default;
 
 void Hdf5File::fail(const std::string& what) const { tensorray::fail(path_, what); }
 
-bool Hdf5File::has(const std::string& name) const { return exists(file_->id, name); }
+bool Hdf5File::has(const std::string& name) const {
+  for (std::size_t end = name.find('/', 1);; end = name.find('/', end + 1)) {  // H5Lexists fails where a group lacks.
+    const std::string part = name.substr(0, end);
+    if (part != "/" && !part.empty() && H5Lexists(file_->id, part.c_str(), H5P_DEFAULT) <= 0) return false;
+    if (end == std::string::npos) return true;
+  }
+}
 
 bool Hdf5File::has_attribute(const std::string& object, const std::string& attribute) const {
   return has(object) && H5Aexists_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT) > 0;
@@ -116,7 +105,9 @@ std::vector<std::uint64_t> Hdf5File::shape(const std::string& dataset) const {
   const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
   const Id space(data < 0 ? -1 : H5Dget_space(data), H5Sclose);
   if (space < 0) fail("its " + dataset + " is no dataset");
-  const std::vector<hsize_t> extents = extents_of(space);
+  const int rank = H5Sget_simple_extent_ndims(space);
+  std::vector<hsize_t> extents(static_cast<std::size_t>(std::max(0, rank)));
+  if (rank > 0) H5Sget_simple_extent_dims(space, extents.data(), nullptr);
   return {extents.begin(), extents.end()};
 }
 
@@ -157,10 +148,7 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const H
 }
 
 std::vector<double> Hdf5File::numbers(const std::string& object, const std::string& attribute) const {
-  const Id id(has_attribute(object, attribute)
-                  ? H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT)
-                  : -1,
-              H5Aclose);
+  const Id id = open_attribute(has_attribute(object, attribute) ? hid_t{file_->id} : -1, object, attribute);
   const Id space(id < 0 ? -1 : H5Aget_space(id), H5Sclose);
   const hssize_t count = space < 0 ? 0 : H5Sget_simple_extent_npoints(space);
   std::vector<double> values(static_cast<std::size_t>(std::clamp<hssize_t>(count, 0, 64)));
@@ -170,10 +158,7 @@ std::vector<double> Hdf5File::numbers(const std::string& object, const std::stri
 }
 
 std::string Hdf5File::text(const std::string& object, const std::string& attribute) const {
-  const Id id(has_attribute(object, attribute)
-                  ? H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT)
-                  : -1,
-              H5Aclose);
+  const Id id = open_attribute(has_attribute(object, attribute) ? hid_t{file_->id} : -1, object, attribute);
   const Id type(id < 0 ? -1 : H5Aget_type(id), H5Tclose);
   const bool is_text = type >= 0 && H5Tget_class(type) == H5T_STRING;
   if (is_text && H5Tis_variable_str(type) > 0) {

@@ -1,5 +1,3 @@
-#include "tools/import/hdf5/vtkhdf.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -24,6 +22,7 @@
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "tools/import/hdf5/hdf5_file.h"
+#include "tools/import/hdf5/hdf5_meshes.h"
 
 namespace tensorray {
 namespace {
@@ -98,7 +97,6 @@ struct Part {
   std::uint64_t point_value = 0, cell_value = 0;                ///< Of parts before it at this step.
 };
 
-/// The parts at a step.
 std::vector<Part> parts_at(const File& file, int step) {
   const auto all = file.hdf.shape(root + "/NumberOfPoints");
   if (all.size() != 1) fail(file.path, "is damaged: NumberOfPoints");

@@ -1,5 +1,3 @@
-#include "tools/import/hdf5/xdmf.h"
-
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -25,9 +23,9 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
+#include "tools/import/hdf5/hdf5_meshes.h"
 #include "tools/import/hdf5/xdmf_document.h"
-#include "tools/import/hdf5/xdmf_values.h"
-#include "tools/import/vtk/vtk_pieces.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
 namespace {
@@ -62,8 +60,7 @@ const std::vector<CellKind>& cell_kinds() {
       {{"wedge_18"}, 41, VTK_BIQUADRATIC_QUADRATIC_WEDGE, 18},
       {{"hexahedron_20", "hex_20"}, 48, VTK_QUADRATIC_HEXAHEDRON, 20},
       {{"hexahedron_24", "hex_24"}, 49, VTK_BIQUADRATIC_QUADRATIC_HEXAHEDRON, 24},
-      {{"hexahedron_27", "hex_27"}, 50, VTK_TRIQUADRATIC_HEXAHEDRON, 27},
-  };
+      {{"hexahedron_27", "hex_27"}, 50, VTK_TRIQUADRATIC_HEXAHEDRON, 27}};
   return kinds;
 }
 
@@ -269,7 +266,6 @@ vtkSmartPointer<vtkDataSet> mesh_of(const Grid& grid) {
   return unstructured_of(grid, topology, geometry, type);
 }
 
-/// Adds the values of the grid at points and cells.
 void add_attributes(const Grid& grid, vtkDataSet& mesh) {
   for (Element* const attribute : grid.document.children(grid.element, {"Attribute"})) {
     const std::string name = xml_attribute(*attribute, {"Name"}), centre = type_of(*attribute, {"Center"});
@@ -290,10 +286,9 @@ void add_attributes(const Grid& grid, vtkDataSet& mesh) {
 }
 
 void add_arrays(vtkDataSet& from, vtkDataSet& to) {
-  for (int i = 0; i < from.GetPointData()->GetNumberOfArrays(); ++i)
-    to.GetPointData()->AddArray(from.GetPointData()->GetArray(i));
-  for (int i = 0; i < from.GetCellData()->GetNumberOfArrays(); ++i)
-    to.GetCellData()->AddArray(from.GetCellData()->GetArray(i));
+  for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL})
+    for (int i = 0; i < from.GetAttributes(type)->GetNumberOfArrays(); ++i)
+      to.GetAttributes(type)->AddArray(from.GetAttributes(type)->GetArray(i));
 }
 
 vtkSmartPointer<vtkDataObject> read_grids(const XdmfDocument& document, int step) {

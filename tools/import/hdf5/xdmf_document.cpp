@@ -28,6 +28,16 @@ std::string taken(xmlChar* text) {
   return result;
 }
 
+/// Adds the grids of each step of `added`, which has some, to the same step of others; its last ones also to later
+/// steps.
+void add_beside(const std::vector<std::vector<Element*>>& added, std::vector<std::vector<Element*>>& steps) {
+  steps.resize(std::max(steps.size(), added.size()));
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const std::vector<Element*>& more = added[std::min(i, added.size() - 1)];
+    steps[i].insert(steps[i].end(), more.begin(), more.end());
+  }
+}
+
 }  // namespace
 
 std::string xml_attribute(Element& element, std::initializer_list<const char*> names) {
@@ -62,11 +72,7 @@ XdmfDocument::XdmfDocument(const std::filesystem::path& path) : path_(path) {
         const std::vector<Element*> always = steps_.front();
         steps_.assign(steps.size(), always);
       }
-      steps_.resize(std::max(steps_.size(), steps.size()));
-      for (std::size_t i = 0; i < steps_.size() && !steps.empty(); ++i) {
-        const std::vector<Element*>& more = steps[std::min(i, steps.size() - 1)];
-        steps_[i].insert(steps_[i].end(), more.begin(), more.end());
-      }
+      if (!steps.empty()) add_beside(steps, steps_);
     }
   if (steps_.empty()) fail(path, "has no grid; write it again");
 }
@@ -119,15 +125,10 @@ void XdmfDocument::add_steps(Element& grid, Steps& steps, int depth) const {
     Steps of_inner;
     add_steps(*inner, of_inner, depth + 1);
     if (of_inner.empty()) continue;
-    if (type == "collection" && collection == "temporal") {
+    if (type == "collection" && collection == "temporal")
       steps.push_back(of_inner.front());
-    } else {
-      steps.resize(std::max(steps.size(), of_inner.size()));
-      for (std::size_t i = 0; i < steps.size(); ++i) {
-        const auto& more = of_inner[std::min(i, of_inner.size() - 1)];
-        steps[i].insert(steps[i].end(), more.begin(), more.end());
-      }
-    }
+    else
+      add_beside(of_inner, steps);
     for (const std::vector<Element*>& step : steps)
       if (step.size() > max_grids) fail(path_, "its grids name more than a million of others; write it again");
   }

@@ -1,16 +1,20 @@
 #pragma once
 /// @file tools/import/hdf5/xdmf_document.h
-/// The XML of an XDMF file: which grids there are at each step of time, and references between elements. Only the .cpp
-/// file includes libxml2. The format: https://www.xdmf.org/index.php/XDMF_Model_and_Format
+/// The XML of an XDMF file: which grids there are at each step of time, references between elements, and numbers. Only
+/// the .cpp file includes libxml2. The format: https://www.xdmf.org/index.php/XDMF_Model_and_Format
 
+#include <cstdint>
 #include <filesystem>
 #include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include <vtkSmartPointer.h>
+
 struct _xmlDoc;
 struct _xmlNode;
+class vtkDataArray;
 
 namespace tensorray {
 
@@ -48,5 +52,18 @@ std::string xml_attribute(XmlElement& element, std::initializer_list<const char*
 
 /// What is between an element's tags, without blanks around it.
 std::string xml_text(XmlElement& element);
+
+/// The numbers of a DataItem: in the XML itself, in HDF5 files, or in binary files.
+struct XdmfValues {
+  vtkSmartPointer<vtkDataArray> numbers;  ///< One component.
+  std::vector<std::uint64_t> shape;
+};
+
+/// Reads a DataItem, also by reference, a part of another one (HyperSlab), or several joined (JOIN).
+/// @throw std::runtime_error naming the file, and what is not read or damaged.
+XdmfValues xdmf_values(const XdmfDocument& document, XmlElement& item);
+
+/// The integers in a text; empty if there is anything else.
+std::vector<std::uint64_t> integers_in(const std::string& text);
 
 }  // namespace tensorray

@@ -1,15 +1,12 @@
-#include "tools/import/hdf5/xdmf_values.h"
-
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <numeric>
 #include <sstream>
 
 #include <vtkDataArray.h>
-#include <vtkDoubleArray.h>
-#include <vtkIdTypeArray.h>
 
 #include "base/errors.h"
 #include "base/text/byte_order.h"
@@ -49,9 +46,7 @@ bool is_integer(Element& item) {
 }
 
 Array new_array(bool integers, std::uint64_t count) {
-  Array array;
-  if (integers) array = vtkSmartPointer<vtkIdTypeArray>::New();
-  if (!integers) array = vtkSmartPointer<vtkDoubleArray>::New();
+  const auto array = Array::Take(vtkDataArray::CreateDataArray(integers ? VTK_ID_TYPE : VTK_DOUBLE));
   array->SetNumberOfTuples(static_cast<vtkIdType>(count));
   return array;
 }
@@ -151,7 +146,6 @@ std::vector<Element*> items_in(const XdmfDocument& document, Element& item, std:
   return items;
 }
 
-/// The part of numbers in memory.
 XdmfValues part_of(const XdmfDocument& document, const XdmfValues& whole, const HyperSlab& slab) {
   const std::size_t rank = whole.shape.size();
   for (std::size_t axis = 0; axis < rank; ++axis) {
@@ -250,8 +244,7 @@ XdmfValues values_of(const XdmfDocument& document, Element& item, int depth) {
 
 std::vector<std::uint64_t> integers_in(const std::string& text) {
   std::istringstream stream(text);
-  Sizes numbers;
-  for (std::uint64_t number; stream >> number;) numbers.push_back(number);
+  const Sizes numbers{std::istream_iterator<std::uint64_t>(stream), {}};
   return stream.eof() && text.find('-') == std::string::npos ? numbers : Sizes();
 }
 

@@ -49,7 +49,7 @@ NumberType type_of(const HeaderLines& header) {
       {"MET_INT", "int32"},       {"MET_UINT", "uint32"},       {"MET_LONG", "int32"},    {"MET_ULONG", "uint32"},
       {"MET_LONG_LONG", "int64"}, {"MET_ULONG_LONG", "uint64"}, {"MET_FLOAT", "float32"}, {"MET_DOUBLE", "float64"}};
   for (const auto& [theirs, ours] : names)
-    if (name == theirs) return *number_type(ours);
+    if (name == theirs) return number_type(header.path, ours, theirs);
   fail(header.path, "its numbers are of type '" + escaped(name) + "', not integers or reals");
 }
 

@@ -74,9 +74,7 @@ void set_type(const HeaderLines& header, RawVoxels& voxels) {
   std::string name = header.text("datatype");
   const std::string ending = name.size() > 2 ? lower_case(name.substr(name.size() - 2)) : "";
   if (ending == "le" || ending == "be") name.resize(name.size() - 2);
-  const std::optional<NumberType> type = number_type(name);
-  if (!type) fail(header.path, "its numbers are " + escaped(header.text("datatype")) + ", not integers or reals");
-  voxels.type = *type;
+  voxels.type = number_type(header.path, name, header.text("datatype"));
   if (ending == "le") voxels.order = ByteOrder::little;
   if (ending == "be") voxels.order = ByteOrder::big;
   const std::vector<double> scaling = header.numbers("scaling", {0, 1});

@@ -32,9 +32,7 @@ using Image = std::unique_ptr<nifti_image, decltype(&nifti_image_free)>;
 
 NumberType type_of(int datatype, const std::filesystem::path& path) {
   const char* const name = nifti_datatype_string(datatype);
-  const std::optional<NumberType> type = number_type(name);
-  if (!type) fail(path, fmt::format("its numbers are {}, not integers or reals", name));
-  return *type;
+  return number_type(path, name, name);
 }
 
 /// Checks a header, in either byte order, for errors that the library would print.

@@ -23,7 +23,6 @@
 namespace tensorray {
 namespace {
 
-/// The contents of the file's header.
 struct Header {
   int number_bytes = 0;
   ByteOrder order = host_byte_order();
@@ -32,7 +31,6 @@ struct Header {
   std::uint64_t data_start = 0;  ///< Offset in the file, in bytes.
 };
 
-/// The header's text, a Python dictionary.
 std::string read_dictionary(std::ifstream& file, const std::filesystem::path& path, Header& header) {
   std::array<unsigned char, 12> start{};
   file.read(reinterpret_cast<char*>(start.data()), 10);
@@ -96,7 +94,6 @@ Header read_header(std::ifstream& file, const std::filesystem::path& path) {
   return header;
 }
 
-/// The number of components of an accepted shape.
 std::size_t component_count(const Header& header, const std::filesystem::path& path) {
   const auto& shape = header.shape;
   if (shape.size() == 5 && shape[3] == 3 && shape[4] == 3) return 9;

@@ -35,13 +35,11 @@ struct Free {
 };
 using NrrdPointer = std::unique_ptr<Nrrd, Free>;
 
-/// The role of each axis of the file.
 struct Axes {
   unsigned int component = 0;
   std::array<unsigned int, 3> space{};
 };
 
-/// The meaning of the components.
 struct Components {
   bool masked = false;
   std::optional<TensorOrder> order;
@@ -116,43 +114,24 @@ Axes find_axes(const Nrrd& nrrd, const std::filesystem::path& path) {
   return {components[0], {space[0], space[1], space[2]}};
 }
 
-Components find_components(const Nrrd& nrrd, unsigned int axis, const std::filesystem::path& path) {
-  switch (nrrd.axis[axis].kind) {
-    case nrrdKind3DSymMatrix:
-      return {false, TensorOrder::fsl};
-    case nrrdKind3DMaskedSymMatrix:
-      return {true, TensorOrder::fsl};
-    case nrrdKind3DMatrix:
-      return {false, TensorOrder::full};
-    case nrrdKind3DMaskedMatrix:
-      return {true, TensorOrder::full};
-    default:
-      break;
-  }
-  switch (nrrd.axis[axis].size) {
-    case 3:
-    case 6:
-      return {false, std::nullopt};
-    case 7:
-      return {true, TensorOrder::fsl};  // Teem itself reads seven components this way.
-    case 9:
-      return {false, TensorOrder::full};
-    default:
-      fail(path, fmt::format("has {} components: a tensor has six, seven with a mask, or nine; a vector three",
-                             nrrd.axis[axis].size));
-  }
+Components find_components(const NrrdAxisInfo& axis, const std::filesystem::path& path) {
+  const std::pair<int, Components> kinds[] = {{nrrdKind3DSymMatrix, {false, TensorOrder::fsl}},
+                                              {nrrdKind3DMaskedSymMatrix, {true, TensorOrder::fsl}},
+                                              {nrrdKind3DMatrix, {false, TensorOrder::full}},
+                                              {nrrdKind3DMaskedMatrix, {true, TensorOrder::full}}};
+  for (const auto& [kind, components] : kinds)
+    if (axis.kind == kind) return components;
+  if (axis.size == 3 || axis.size == 6) return {};
+  if (axis.size == 7) return {true, TensorOrder::fsl};  // Teem itself reads seven components this way.
+  if (axis.size == 9) return {false, TensorOrder::full};
+  fail(path, fmt::format("has {} components: a tensor has six, seven with a mask, or nine; a vector three", axis.size));
 }
 
 /// The signs that take the file's space to RAS.
 Vector3d to_ras(const Nrrd& nrrd) {
-  switch (nrrd.space) {
-    case nrrdSpaceLeftPosteriorSuperior:
-      return {-1, -1, 1};
-    case nrrdSpaceLeftAnteriorSuperior:
-      return {-1, 1, 1};
-    default:
-      return {1, 1, 1};
-  }
+  const bool is_lps = nrrd.space == nrrdSpaceLeftPosteriorSuperior,
+             is_las = nrrd.space == nrrdSpaceLeftAnteriorSuperior;
+  return {is_lps || is_las ? -1.0 : 1.0, is_lps ? -1.0 : 1.0, 1.0};
 }
 
 /// For an axis without a direction: the voxel spacing, and the position of the first voxel.
@@ -221,7 +200,7 @@ RawVoxels voxels_of(NrrdPointer nrrd, const Axes& axes) {
 Lattice open_nrrd(const std::filesystem::path& path) {
   NrrdPointer nrrd = read_nrrd(path);
   const Axes axes = find_axes(*nrrd, path);
-  const Components components = find_components(*nrrd, axes.component, path);
+  const Components components = find_components(nrrd->axis[axes.component], path);
   Lattice lattice;
   for (int i = 0; i < 3; ++i)
     lattice.size[i] = static_cast<int>(nrrd->axis[axes.space[static_cast<std::size_t>(i)]].size);

@@ -63,7 +63,6 @@ double number(const char* bytes, ByteOrder order) {
   return static_cast<double>(read_number<Number>(bytes, order));
 }
 
-/// The pages of a mapped file.
 struct Mapping {
   void* pages = nullptr;
   std::size_t size = 0;
@@ -83,24 +82,18 @@ std::shared_ptr<const char> map_bytes(const std::filesystem::path& path, std::ui
 
 using NumberOf = double (*)(const char*, ByteOrder);
 
+template <class Real, class Signed, class Unsigned>
+NumberOf reader_of(NumberType::Kind kind) {
+  if (kind == NumberType::Kind::real) return number<Real>;
+  return kind == NumberType::Kind::signed_integer ? number<Signed> : number<Unsigned>;
+}
+
 NumberOf reader_of(const NumberType& type) {
-  using Kind = NumberType::Kind;
-  switch (type.bytes) {
-    case 1:
-      return type.kind == Kind::signed_integer ? number<std::int8_t> : number<std::uint8_t>;
-    case 2:
-      return type.kind == Kind::real             ? number<Eigen::half>
-             : type.kind == Kind::signed_integer ? number<std::int16_t>
-                                                 : number<std::uint16_t>;
-    case 4:
-      return type.kind == Kind::real             ? number<float>
-             : type.kind == Kind::signed_integer ? number<std::int32_t>
-                                                 : number<std::uint32_t>;
-    default:
-      return type.kind == Kind::real             ? number<double>
-             : type.kind == Kind::signed_integer ? number<std::int64_t>
-                                                 : number<std::uint64_t>;
-  }
+  if (type.bytes == 1)
+    return type.kind == NumberType::Kind::signed_integer ? number<std::int8_t> : number<std::uint8_t>;
+  if (type.bytes == 2) return reader_of<Eigen::half, std::int16_t, std::uint16_t>(type.kind);
+  if (type.bytes == 4) return reader_of<float, std::int32_t, std::uint32_t>(type.kind);
+  return reader_of<double, std::int64_t, std::uint64_t>(type.kind);
 }
 
 }  // namespace
@@ -117,15 +110,15 @@ void require_invertible(const std::filesystem::path& path, const Eigen::Affine3d
     fail(path, is_what);
 }
 
-std::optional<NumberType> number_type(const std::string& name) {
+NumberType number_type(const std::filesystem::path& path, const std::string& name, const std::string& shown) {
   using Kind = NumberType::Kind;
   const std::pair<const char*, Kind> kinds[] = {
       {"int", Kind::signed_integer}, {"uint", Kind::unsigned_integer}, {"float", Kind::real}};
   for (const auto& [word, kind] : kinds)
     for (const int bytes : {1, 2, 4, 8})
       if (lower_case(name) == word + std::to_string(8 * bytes) && !(kind == Kind::real && bytes == 1))
-        return NumberType{kind, bytes};
-  return {};
+        return {kind, bytes};
+  fail(path, "its numbers are " + escaped(shown) + ", not integers or reals");
 }
 
 std::vector<char, PageAllocator<char>> read_some(const RawPlace& place, std::size_t count) {

@@ -9,7 +9,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,8 +32,9 @@ struct NumberType {
   int bytes = 4;  ///< 1 (not real), 2, 4 or 8.
 };
 
-/// The type with a name as in "Float32", "uint8", without a byte order; nothing if there is no such type.
-std::optional<NumberType> number_type(const std::string& name);
+/// The type with a name as in "Float32", "uint8", without a byte order. @throw std::runtime_error naming the path, and
+/// the type as `shown`, if there is no such type.
+NumberType number_type(const std::filesystem::path& path, const std::string& name, const std::string& shown);
 
 /// Where bytes are in a file.
 struct RawPlace {

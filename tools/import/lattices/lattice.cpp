@@ -9,6 +9,8 @@
 #include <vector>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/SVD>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
@@ -166,6 +168,23 @@ TensorGrid empty_grid(const Lattice& lattice) {
 }
 
 }  // namespace
+
+const std::vector<std::pair<std::string, ComponentFrame>>& component_frames() {
+  using Frame = ComponentFrame;
+  static const std::vector<std::pair<std::string, Frame>> frames = {
+      {"ras", Frame::ras}, {"lps", Frame::lps}, {"voxels", Frame::voxels}, {"fsl", Frame::fsl}};
+  return frames;
+}
+
+Eigen::Matrix3d axes_of(ComponentFrame frame, const Eigen::Matrix3d& to_ras) {
+  if (frame == ComponentFrame::ras) return Eigen::Matrix3d::Identity();
+  if (frame == ComponentFrame::lps) return Eigen::Vector3d(-1, -1, 1).asDiagonal();
+  const Eigen::Matrix3d directions = to_ras.colwise().normalized();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(directions, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d axes = svd.matrixU() * svd.matrixV().transpose();
+  if (frame == ComponentFrame::fsl && to_ras.determinant() > 0) axes.col(0) *= -1;
+  return axes;
+}
 
 void take_frame(Lattice& lattice, ComponentFrame frame) {
   if (!lattice.takes_frame)

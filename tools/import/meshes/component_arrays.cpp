@@ -1,5 +1,3 @@
-#include "tools/import/meshes/component_arrays.h"
-
 #include <algorithm>
 #include <optional>
 #include <sstream>
@@ -16,7 +14,8 @@
 #include <vtkSmartPointer.h>
 
 #include "base/text/text.h"
-#include "tools/import/lattices/component_names.h"
+#include "tools/import/lattices/tensor_order.h"
+#include "tools/import/meshes/mesh_tensors.h"
 
 namespace tensorray {
 namespace {
@@ -26,9 +25,7 @@ using Names = std::vector<std::string>;
 Names names_in(const std::string& list) {
   Names names;
   std::istringstream stream(list + ",");  // getline drops an empty name at the end
-  for (std::string name; std::getline(stream, name, ',');) {
-    names.push_back(trimmed(name));
-  }
+  for (std::string name; std::getline(stream, name, ',');) names.push_back(trimmed(name));
   return names;
 }
 
@@ -103,11 +100,7 @@ std::vector<Part> parts_of(vtkDataSet& mesh, vtkDataSetAttributes& data, const N
       take == Take::tensor ? count == 6 || count == 9 || is_plane(parts, take) : count == 3 || (count == 2 && is_flat);
   if (fits) return parts;
   throw std::invalid_argument(
-      fmt::format("{} lists {} arrays, and {}; {}",
-                  take == Take::tensor     ? "--array"
-                  : take == Take::gradient ? "--gradient-of"
-                                           : "--strain-of",
-                  names.size(),
+      fmt::format("{} lists {} arrays, and {}; {}", flag_of(take), names.size(),
                   take == Take::tensor ? "a tensor has 6 or 9 components, of a plane 3 or 4, or 3 vectors as rows"
                                        : "a vector has 3 components, in a flat mesh across z also 2",
                   list_of_arrays(mesh)));
@@ -118,8 +111,7 @@ vtkSmartPointer<vtkDataArray> new_array(const std::vector<Part>& parts, int comp
   const int first = parts.front().array->GetDataType();
   const bool same =
       std::all_of(parts.begin(), parts.end(), [&](const Part& part) { return part.array->GetDataType() == first; });
-  vtkSmartPointer<vtkDataArray> array;
-  array.TakeReference(vtkDataArray::CreateDataArray(same ? first : VTK_DOUBLE));
+  const auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(same ? first : VTK_DOUBLE));
   array->SetName(take == Take::tensor ? tensor_array : "vector");
   array->SetNumberOfComponents(components);
   array->SetNumberOfTuples(parts.front().array->GetNumberOfTuples());

@@ -80,8 +80,7 @@ int axis_across(const Eigen::AlignedBox3d& box) {
   if (thinnest > flatness * box.diagonal().norm())
     throw std::invalid_argument(
         "the mesh has no three-dimensional cells, and its flat cells are a surface in space: a field needs tensors in "
-        "a "
-        "volume, or in a plane across x, y or z");
+        "a volume, or in a plane across x, y or z");
   return axis;
 }
 
@@ -108,25 +107,23 @@ void add_cell(vtkDataSet& mesh, std::vector<vtkIdType> part, int axis, vtkUnstru
   slab.InsertNextCell(corners == 3 ? VTK_WEDGE : VTK_HEXAHEDRON, static_cast<vtkIdType>(part.size()), part.data());
 }
 
-void pad_vectors(vtkDataSetAttributes& data) {
-  for (int i = 0; i < data.GetNumberOfArrays(); ++i) {
-    vtkDataArray* const array = data.GetArray(i);
-    if (!array || array->GetNumberOfComponents() != 2 || !array->GetName()) continue;
-    vtkSmartPointer<vtkDataArray> padded;
-    padded.TakeReference(array->NewInstance());
-    padded->SetName(array->GetName());
-    padded->SetNumberOfComponents(3);
-    padded->SetNumberOfTuples(array->GetNumberOfTuples());
-    padded->Fill(0);
-    for (int component = 0; component < 2; ++component) padded->CopyComponent(component, array, component);
-    data.AddArray(padded);  // Replaces the one of the same name, at the same index.
-  }
-}
-
 }  // namespace
 
 void pad_vectors(vtkDataSet& mesh) {
-  for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) pad_vectors(*mesh.GetAttributes(type));
+  for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) {
+    vtkDataSetAttributes& data = *mesh.GetAttributes(type);
+    for (int i = 0; i < data.GetNumberOfArrays(); ++i) {
+      vtkDataArray* const array = data.GetArray(i);
+      if (!array || array->GetNumberOfComponents() != 2 || !array->GetName()) continue;
+      const auto padded = vtkSmartPointer<vtkDataArray>::Take(array->NewInstance());
+      padded->SetName(array->GetName());
+      padded->SetNumberOfComponents(3);
+      padded->SetNumberOfTuples(array->GetNumberOfTuples());
+      padded->Fill(0);
+      for (int component = 0; component < 2; ++component) padded->CopyComponent(component, array, component);
+      data.AddArray(padded);  // Replaces the one of the same name, at the same index.
+    }
+  }
 }
 
 std::optional<FlatMesh> flat_mesh(vtkDataSet& mesh) {

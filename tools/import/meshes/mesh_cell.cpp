@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <unordered_map>
 
 #include <Eigen/Eigenvalues>
 #include <vtkCellType.h>
@@ -34,46 +35,28 @@ bool is_hidden(unsigned char ghost_type) {
 }
 
 MeshCell::Type MeshCell::type_of(int cell_type) {
-  switch (cell_type) {
-    case VTK_VOXEL:
-    case VTK_HEXAHEDRON:
-      return {Shape::box, 8};
-    case VTK_QUADRATIC_HEXAHEDRON:
-      return {Shape::box, 20};
-    case VTK_BIQUADRATIC_QUADRATIC_HEXAHEDRON:
-      return {Shape::box, 24};
-    case VTK_TRIQUADRATIC_HEXAHEDRON:
-      return {Shape::box, 27};
-    case VTK_LAGRANGE_HEXAHEDRON:
-    case VTK_BEZIER_HEXAHEDRON:
-      return {Shape::box, 0, Derivatives::by_point};
-    case VTK_TETRA:
-      return {Shape::simplex, 4};
-    case VTK_QUADRATIC_TETRA:
-      return {Shape::simplex, 10};
-    case VTK_LAGRANGE_TETRAHEDRON:
-      return {Shape::simplex, 0};
-    case VTK_BEZIER_TETRAHEDRON:
-      return {Shape::simplex, 0, Derivatives::differences};
-    case VTK_WEDGE:
-      return {Shape::prism, 6};
-    case VTK_QUADRATIC_WEDGE:
-      return {Shape::prism, 15};
-    case VTK_QUADRATIC_LINEAR_WEDGE:
-      return {Shape::prism, 12};
-    case VTK_BIQUADRATIC_QUADRATIC_WEDGE:
-      return {Shape::prism, 18};
-    case VTK_LAGRANGE_WEDGE:
-      return {Shape::prism, 0};
-    case VTK_PYRAMID:
-      return {Shape::collapsed_pyramid, 5};
-    case VTK_QUADRATIC_PYRAMID:
-      return {Shape::collapsed_pyramid, 13, Derivatives::differences};
-    case VTK_TRIQUADRATIC_PYRAMID:
-      return {Shape::pyramid, 19, Derivatives::differences};
-    default:
-      return {};
-  }
+  static const std::unordered_map<int, Type> types{
+      {VTK_VOXEL, {Shape::box, 8}},
+      {VTK_HEXAHEDRON, {Shape::box, 8}},
+      {VTK_QUADRATIC_HEXAHEDRON, {Shape::box, 20}},
+      {VTK_BIQUADRATIC_QUADRATIC_HEXAHEDRON, {Shape::box, 24}},
+      {VTK_TRIQUADRATIC_HEXAHEDRON, {Shape::box, 27}},
+      {VTK_LAGRANGE_HEXAHEDRON, {Shape::box, 0, Derivatives::by_point}},
+      {VTK_BEZIER_HEXAHEDRON, {Shape::box, 0, Derivatives::by_point}},
+      {VTK_TETRA, {Shape::simplex, 4}},
+      {VTK_QUADRATIC_TETRA, {Shape::simplex, 10}},
+      {VTK_LAGRANGE_TETRAHEDRON, {Shape::simplex, 0}},
+      {VTK_BEZIER_TETRAHEDRON, {Shape::simplex, 0, Derivatives::differences}},
+      {VTK_WEDGE, {Shape::prism, 6}},
+      {VTK_QUADRATIC_WEDGE, {Shape::prism, 15}},
+      {VTK_QUADRATIC_LINEAR_WEDGE, {Shape::prism, 12}},
+      {VTK_BIQUADRATIC_QUADRATIC_WEDGE, {Shape::prism, 18}},
+      {VTK_LAGRANGE_WEDGE, {Shape::prism, 0}},
+      {VTK_PYRAMID, {Shape::collapsed_pyramid, 5}},
+      {VTK_QUADRATIC_PYRAMID, {Shape::collapsed_pyramid, 13, Derivatives::differences}},
+      {VTK_TRIQUADRATIC_PYRAMID, {Shape::pyramid, 19, Derivatives::differences}}};
+  const auto found = types.find(cell_type);
+  return found == types.end() ? Type() : found->second;
 }
 
 bool MeshCell::load(vtkDataSet& mesh, vtkIdType id) {

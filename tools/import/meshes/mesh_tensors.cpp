@@ -19,7 +19,7 @@
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
 
-#include "tools/import/lattices/component_names.h"
+#include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/mesh_cell.h"
 
 namespace tensorray {
@@ -35,16 +35,11 @@ bool suits(int components, Take take, bool is_named) {
   return components == 3;
 }
 
-vtkDataSetAttributes& attributes(vtkDataSet& mesh, bool of_cells) {
-  if (of_cells) return *mesh.GetCellData();
-  return *mesh.GetPointData();
-}
-
 /// Calls `visit(array, of_cells)` for the named numeric arrays, first those of points.
 template <class Visit>
 void for_each_array(vtkDataSet& mesh, const Visit& visit) {
   for (const bool of_cells : {false, true}) {
-    vtkDataSetAttributes& data = attributes(mesh, of_cells);
+    vtkDataSetAttributes& data = attributes_of(mesh, of_cells);
     for (int i = 0; i < data.GetNumberOfArrays(); ++i) {
       vtkDataArray* array = data.GetArray(i);
       if (!array || !array->GetName()) continue;
@@ -187,11 +182,11 @@ vtkSmartPointer<vtkDataSet> with_arrays(vtkDataSet& mesh, const Array& of_points
   auto result = vtkSmartPointer<vtkDataSet>::Take(mesh.NewInstance());
   result->CopyStructure(&mesh);
   for (const bool cells : {false, true}) {
-    if (vtkDataArray* ghosts = attributes(mesh, cells).GetArray(vtkDataSetAttributes::GhostArrayName()))
-      attributes(*result, cells).AddArray(ghosts);
+    if (vtkDataArray* ghosts = attributes_of(mesh, cells).GetArray(vtkDataSetAttributes::GhostArrayName()))
+      attributes_of(*result, cells).AddArray(ghosts);
     if (const Array& tensors = cells ? of_cells : of_points) {
       tensors->SetName(tensor_array);
-      attributes(*result, cells).AddArray(tensors);
+      attributes_of(*result, cells).AddArray(tensors);
     }
   }
   // VTK 9.1 keeps that a structured grid has no ghosts from when its structure was copied.
@@ -201,6 +196,14 @@ vtkSmartPointer<vtkDataSet> with_arrays(vtkDataSet& mesh, const Array& of_points
 }
 
 }  // namespace
+
+const char* flag_of(Take take) {
+  return take == Take::tensor ? "--array" : take == Take::gradient ? "--gradient-of" : "--strain-of";
+}
+
+vtkDataSetAttributes& attributes_of(vtkDataSet& mesh, bool of_cells) {
+  return *mesh.GetAttributes(of_cells ? vtkDataObject::CELL : vtkDataObject::POINT);
+}
 
 std::string list_of_arrays(vtkDataSet& mesh) {
   std::string list;
@@ -238,7 +241,7 @@ ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take, C
     choices.push_back({array.GetName(), of_cells});
   });
   if (choices.size() == 1) return choices.front();
-  const char* const flag = take == Take::tensor ? "--array" : take == Take::gradient ? "--gradient-of" : "--strain-of";
+  const char* const flag = flag_of(take);
   std::string reason;
   if (!choices.empty())
     reason = fmt::format("several arrays suit, choose one with {}", flag);
@@ -254,7 +257,7 @@ ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take, C
 
 vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& array, Take take,
                                          const std::optional<TensorOrder>& order, CellValues cell_values) {
-  vtkDataArray* const given = attributes(mesh, array.of_cells).GetArray(array.name.c_str());
+  vtkDataArray* const given = attributes_of(mesh, array.of_cells).GetArray(array.name.c_str());
   if (!given || !suits(given->GetNumberOfComponents(), take, true))
     throw std::invalid_argument(
         fmt::format("no array \"{}\" of which {}; {}", array.name, wanted(take), list_of_arrays(mesh)));

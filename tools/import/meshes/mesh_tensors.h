@@ -9,6 +9,7 @@
 
 class vtkDataArray;
 class vtkDataSet;
+class vtkDataSetAttributes;
 template <class T>
 class vtkSmartPointer;
 
@@ -21,6 +22,9 @@ enum class Take {
   strain,    ///< The symmetric part of the gradient of a displacement.
 };
 
+/// The option with which users choose the array, for messages.
+const char* flag_of(Take take);
+
 /// What tensors at cells are made of: an interpolation of their averages at points, or each cell's own everywhere in
 /// it.
 enum class CellValues { linear, constant };
@@ -30,6 +34,9 @@ struct ArrayChoice {
   std::string name;
   bool of_cells = false;
 };
+
+/// The arrays at the cells or points of a mesh.
+vtkDataSetAttributes& attributes_of(vtkDataSet& mesh, bool of_cells);
 
 /// The name of the array that with_tensors makes.
 constexpr const char* tensor_array = "tensor";
@@ -47,6 +54,22 @@ TensorOrder order_in(vtkDataArray& array, const std::optional<TensorOrder>& give
 /// @throw std::invalid_argument that lists the arrays with their components and whether they are at points or cells.
 ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take,
                          CellValues cell_values = CellValues::linear);
+
+/// Whether `names` is a list of arrays, with commas between the names. An array whose own name has commas is no list.
+bool is_array_list(vtkDataSet& mesh, const std::string& names);
+
+/// Joins the components of tensors and vectors that are arrays of their own, as many solvers write them, listed in
+/// `names`, to an array called "tensor", or "vector" of which a tensor is derived, and removes
+/// the arrays that are listed from `mesh`. A tensor has six or nine components, or three vectors as rows; one of the
+/// plane of x and y has three or four (xx, yy, xy, and perhaps zz, as the last two letters of their names tell). A
+/// vector has three components; in a flat mesh across z also two. Each is a scalar array, NAME:COMPONENT of another
+/// array (by the component's name, or its number from 0 on), or a component with that name, as VTK joins scalars of
+/// ExodusII. Spaces around a name do not count. A name may occur twice. All are at points, or else all are at cells.
+/// The components of the new array have the names of the old ones, of which with_tensors finds their
+/// order; they are sorted if that order has no name (tensor_order.h).
+/// @param is_flat  The mesh is flat across z, or was before it became a slab.
+/// @throw std::invalid_argument that names the array and lists those that there are.
+ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& names, Take take = Take::tensor, bool is_flat = false);
 
 /// The points and cells of a mesh with one point array `tensor_array`: a vtkDoubleArray of nine components, row by
 /// row. The tensors are the array's components (six, nine or more; of more than nine the first six are the tensor,

@@ -60,8 +60,7 @@ void in_child_process(const std::function<void()>& work, const Progress& progres
   if (child < 0) throw std::runtime_error("no child process can be started: the system has too many");
   if (child == 0) {
     be_mortal(mask);
-    _exit(run_and_report(
-        work));  // Not exit: the exit handlers of some libraries wait for threads that the child does not have.
+    _exit(run_and_report(work));  // Not exit: some libraries wait there for threads that the child does not have.
   }
   const int status = wait_for(child, progress);
   if (progress.cancelled) throw Cancelled();

@@ -4,34 +4,377 @@
 ///   tensorray-import --read-vtp EXCHANGE FILE NAME...    VTK polydata, with the named arrays → a file of poly_data.h
 /// Only volumes/points/vtk_files.h uses the last one. Its errors are one line, without the program's name.
 
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
+#include <unistd.h>
 
+#include "base/files/descriptor.h"
+#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
+#include "base/files/temporary_folder.h"
+#include "base/process/progress.h"
+#include "base/text/numbered_name.h"
+#include "base/text/text.h"
 #include "tools/command_line/interrupts.h"
+#include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
-#include "tools/import/program/import_command.h"
+#include "tools/command_line/threads.h"
+#include "tools/command_line/vdb_output.h"
+#include "tools/import/import_file.h"
+#include "tools/import/program/child_process.h"
 #include "tools/import/vtk_formats/vtp_files.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/grids/page_memory.h"
 
+namespace tensorray {
 namespace {
 
+/// The fraction of the peak that sampling must keep; below it a warning is printed.
+constexpr double kept_peak = 0.95;
+/// The greatest part of voxels with a negative eigenvalue that is no reason for a warning: noise makes some.
+constexpr double max_negative = 0.2;
+
+struct ImportOptions {
+  ImportSettings settings;
+  std::string array, gradient_of, strain_of, order, frame, cells = "linear";
+  std::vector<int> resolution;
+  std::vector<double> voxel_size, bounds, origin;
+  double thickness = 0;
+  std::filesystem::path output, boundary;
+  std::string name, units, steps = "last";
+  std::size_t memory = 0;  ///< Bytes; 0: without a bound.
+  bool half = false, quiet = false, tells_progress = false;
+};
+
+/// What a name stands for; CLI11 has checked that there is such a name.
+template <class Value>
+std::optional<Value> named(const std::string& name, const std::vector<std::pair<std::string, Value>>& table) {
+  for (const auto& [text, value] : table)
+    if (text == name) return value;
+  return {};
+}
+
+ImportSettings settings_of(const ImportOptions& options) {
+  ImportSettings settings = options.settings;
+  settings.array = options.array + options.gradient_of + options.strain_of;  // They exclude each other.
+  if (!options.gradient_of.empty()) settings.take = Take::gradient;
+  if (!options.strain_of.empty()) settings.take = Take::strain;
+  settings.order = named(options.order, tensor_orders());
+  settings.frame = named(options.frame, component_frames());
+  if (options.cells == "constant") settings.cell_values = CellValues::constant;
+  if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
+  if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
+  if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
+  if (options.thickness > 0) settings.thickness = options.thickness;
+  if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
+  if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
+  if (options.resolution.size() == 2) throw std::invalid_argument("--resolution needs one number, or three: x y z");
+  if (!options.origin.empty()) settings.origin = Eigen::Vector3d(options.origin.data());
+  if (settings.origin && !settings.origin->allFinite()) throw std::invalid_argument("--origin needs finite numbers");
+  if (!options.bounds.empty()) {
+    const Eigen::Vector3d min(options.bounds[0], options.bounds[2], options.bounds[4]);
+    const Eigen::Vector3d max(options.bounds[1], options.bounds[3], options.bounds[5]);
+    if (!(min.array() <= max.array()).all())
+      throw std::invalid_argument("--bounds needs xmin xmax ymin ymax zmin zmax, each min below its max");
+    settings.sampling.bounds = Eigen::AlignedBox3d(min, max);
+  }
+  return settings;
+}
+
+void print_lattice(const LatticeReport& report) {
+  const double percent = 100.0 * static_cast<double>(report.active) / static_cast<double>(report.voxels);
+  tell_made(fmt::format("  voxels as they were: {} of {} active ({:.1f}%); {} background, {} not finite", report.active,
+                        report.voxels, percent, report.background, report.non_finite));
+  for (const std::string& note : report.notes) tell_made(fmt::format("  {}", note));
+  if (report.negative > max_negative)
+    tell({fmt::format(
+             "tensorray: warning: {:.0f}% of the voxels have a negative eigenvalue; if the field is a diffusion "
+             "tensor, --order is wrong",
+             100 * report.negative)},
+         false);
+}
+
+void print_sampling(const ImportReport& report) {
+  const SamplingReport& mesh = *report.mesh;
+  tell_made(fmt::format("  sampled from {} cells at {} x {} x {} voxels of {:.4g} x {:.4g} x {:.4g}; {} active",
+                        report.mesh_cells, mesh.size.x(), mesh.size.y(), mesh.size.z(), mesh.voxel.x(), mesh.voxel.y(),
+                        mesh.voxel.z(), mesh.active));
+  tell_made(fmt::format("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}",
+                        mesh.native_peak, mesh.sampled_peak, mesh.native_median, mesh.sampled_median));
+  if (mesh.non_finite > 0)
+    tell_made(fmt::format("  {} {} of the mesh are not finite", mesh.non_finite, mesh.of_cells ? "cells" : "points"));
+  if (mesh.sampled_peak < kept_peak * mesh.native_peak)
+    tell({fmt::format(
+             "tensorray: warning: the grid holds {:.0f}% of the mesh's peak norm; a larger --resolution, or --bounds "
+             "around what matters, holds more",
+             100 * mesh.sampled_peak / mesh.native_peak)},
+         false);
+}
+
+/// Progress as a line of phase, done and total, for a program that has started this one.
+void tell_progress(const std::string& phase, std::uint64_t done, std::uint64_t total) {
+  static_cast<void>(write_whole(STDOUT_FILENO, fmt::format("{}\t{}\t{}\n", phase, done, total)));
+}
+
+/// The work of the child: everything except giving the files their final names.
+void import_to(const ImportOptions& options, const ImportSettings& settings, OutputFile& output, Progress& progress) {
+  const Threads threads;
+  if (options.memory > 0) bound_memory(options.memory, std::filesystem::absolute(options.output).parent_path());
+  ImportReport report;
+  std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);
+  if (options.tells_progress) progress.report = tell_progress;
+  TensorGrid grid = import_tensors(settings, progress, report);
+  if (!options.name.empty()) grid.name = options.name;
+  grid.metadata["tensorray:field"] = grid.name;
+  if (!options.units.empty()) grid.metadata["tensorray:units"] = options.units;
+  progress.update("writing", 0, 1);
+  const std::string name = grid.name;
+  const Eigen::Vector3i size = grid.active_box().sizes() + Eigen::Vector3i::Ones();
+  output.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, grid, options.half); });
+  bar.reset();
+  tell_made(fmt::format("{}: field \"{}\", {} x {} x {} voxels, {}", options.output.string(), escaped(name), size.x(),
+                        size.y(), size.z(),
+                        bytes_text(static_cast<double>(std::filesystem::file_size(output.path())))));
+  if (report.lattice) print_lattice(*report.lattice);
+  if (report.thickness > 0)
+    tell_made(fmt::format("  a flat mesh: a slab of one voxel, {:.4g} thick{}", report.thickness,
+                          settings.thickness ? "" : " (--thickness)"));
+  if (report.mesh) print_sampling(report);
+  if (report.boundary_triangles > 0)
+    tell_made(
+        fmt::format("{}: the body's surface, {} triangles", options.boundary.string(), report.boundary_triangles));
+}
+
+/// A file that the input names (the data of a header, a part of a data set) may have any name, also that of the output.
+/// None of them is an OpenVDB file, and no other file is replaced. @throw std::invalid_argument
+void require_replaceable(const std::filesystem::path& output) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(output, error) || std::filesystem::file_size(output, error) == 0) return;
+  const std::string mark = " BDV";  // With which OpenVDB files begin.
+  std::string start(mark.size(), 0);
+  std::ifstream(output, std::ios::binary).read(start.data(), static_cast<std::streamsize>(start.size()));
+  if (start != mark)
+    throw std::invalid_argument(escaped(output.string()) +
+                                ": is there, and is no OpenVDB file; it may belong to what is imported: remove it, or "
+                                "choose another name");
+}
+
+void check_files(const ImportOptions& options, const std::vector<std::filesystem::path>& read) {
+  std::vector<NamedFile> inputs;
+  for (const std::filesystem::path& file : read) inputs.push_back({file, "the file to import"});
+  require_distinct_files(inputs, {{options.output, "-o"}, {options.boundary, "--boundary"}});
+  require_replaceable(options.output);
+}
+
+std::string crash_message(const ImportSettings& settings) {
+  return settings.files.front().string() +
+         ": reading it ended the reader; the file is damaged or cut off, or does not fit in memory";
+}
+
+void import_step(const ImportOptions& options, ImportSettings settings, Progress& progress) {
+  check_files(options, settings.files);
+  std::vector<OutputFile> files;
+  files.emplace_back(options.output);
+  if (!options.boundary.empty()) {
+    files.emplace_back(options.boundary);
+    settings.boundary = files.back().path();
+  }
+  in_child_process([&] { import_to(options, settings, files.front(), progress); }, progress, crash_message(settings));
+  commit_all(files);
+}
+
+/// Counts in a child process, too, which leaves the number in a file.
+int count_steps(const ImportSettings& settings, Progress& progress) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder / "steps";
+  in_child_process([&] { std::ofstream(file) << time_steps(settings); }, progress, crash_message(settings));
+  int steps = 1;
+  std::ifstream(file) >> steps;
+  return steps;
+}
+
+/// One file for each step of time, which is there when the next step is read.
+void import_all_steps(ImportOptions options, ImportSettings settings, Progress& progress) {
+  const std::filesystem::path output = options.output;
+  if (!has_number_sign(output.filename().string()))
+    throw std::invalid_argument(output.string() +
+                                ": all steps would have this name; count them by #, as in flow.####.vdb");
+  const int steps = count_steps(settings, progress);
+  for (int step = 0; step < steps; ++step) {
+    settings.step = step;
+    options.output = output.parent_path() / numbered(output.filename().string(), step + 1);
+    import_step(options, settings, progress);
+    options.boundary.clear();  // The body is the same.
+  }
+}
+
+void import(const ImportOptions& options, Progress& progress) {
+  ImportSettings settings = settings_of(options);
+  for (const std::filesystem::path& file : settings.files) {
+    if (!std::filesystem::exists(file)) throw std::runtime_error(file.string() + " does not exist");
+    if (is_device(file))
+      throw std::runtime_error(file.string() + " is a pipe or a device; write what it gives to a file");
+  }
+  if (options.steps == "all") return import_all_steps(options, settings, progress);
+  int step = 1;
+  if (options.steps != "last" && options.steps != "first" &&
+      (!CLI::detail::lexical_cast(options.steps, step) || step < 1))
+    throw std::invalid_argument("--steps " + escaped(options.steps) + ": give all, first, last, or a number from 1 on");
+  if (options.steps != "last") settings.step = step - 1;
+  import_step(options, settings, progress);
+}
+
+std::string check_ply_output(const std::string& text) {
+  return std::filesystem::path(text).extension() == ".ply" ? "" : text + " must end in .ply";
+}
+
+std::string positive(const std::string& text) {
+  double value = 0;
+  const bool is_number = CLI::detail::lexical_cast(text, value);
+  return is_number && std::isfinite(value) && value > 0 ? "" : text + " is no size: give a number greater than 0";
+}
+
+void add_what(CLI::App& command, ImportOptions& options) {
+  command.option_defaults()->group("What to take");
+  auto* array =
+      command.add_option("--array", options.array,
+                         "The array that is the tensor (default: the only one), or its components: six or nine scalar "
+                         "arrays (sxx,syy,szz,sxy,syz,sxz), components of others (NAME:COMPONENT), or three vectors "
+                         "as rows");
+  auto* gradient =
+      command.add_option("--gradient-of", options.gradient_of,
+                         "Take the gradient of this vector array, or of three scalar arrays (u,v,w): T_ij = dv_i/dx_j, "
+                         "made on the mesh itself");
+  auto* strain = command.add_option("--strain-of", options.strain_of,
+                                    "Take the symmetric part of the gradient of this displacement");
+  array->excludes(gradient, strain);
+  gradient->excludes(strain);
+  command
+      .add_option(
+          "--order", options.order,
+          "Order of six components: vtk (xx yy zz xy yz xz), fsl (xx xy xz yy yz zz), mrtrix (xx yy zz xy xz "
+          "yz), voigt (xx yy zz yz xz xy), lower (xx xy yy xz yz zz); of four: plane (xx yy zz xy), 2x2 (xx xy yx yy)")
+      ->check(CLI::IsMember(tensor_orders()))
+      ->option_text("ORDER");
+  command
+      .add_option("--frame", options.frame,
+                  "Axes of the components in anatomical files (NIfTI, NRRD, MetaImage, MRtrix): ras (scanner; MRtrix), "
+                  "lps (displacements of "
+                  "ITK and ANTs), voxels (tensors of ANTs and dipy), fsl (voxels, with FSL's flip); default: those of "
+                  "--order fsl and lower, else ras (MetaImage: lps; NRRD: its space)")
+      ->check(CLI::IsMember(component_frames()))
+      ->option_text("FRAME");
+  command
+      .add_option("--cells", options.cells,
+                  "What tensors at the cells of a mesh are in between: linear (averaged to the points, and "
+                  "interpolated), or constant in each cell (linear)")
+      ->check(CLI::IsMember({"linear", "constant"}))
+      ->option_text("VALUES");
+}
+
+void add_where(CLI::App& command, ImportOptions& options) {
+  command.option_defaults()->group("Grid");
+  auto* resolution = command
+                         .add_option("--resolution", options.resolution,
+                                     "Voxels along the longest edge, or along x, y and z (default: the median cell "
+                                     "is a voxel; data on voxels keep theirs)")
+                         ->expected(1, 3)
+                         ->check(CLI::Range(1, 8192));
+  command
+      .add_option("--voxel-size", options.voxel_size,
+                  "Edge of a voxel; of .npy, the distance of its voxels, or three: x y z (default: 1)")
+      ->expected(1, 3)
+      ->check(positive)
+      ->excludes(resolution);
+  command
+      .add_option("--origin", options.origin, "World x y z of the centre of the first voxel of .npy (default: 0 0 0)")
+      ->expected(3);
+  command
+      .add_option("--thickness", options.thickness,
+                  "Thickness of the slab that a flat mesh becomes (default: a typical edge of its cells)")
+      ->check(positive);
+  command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6);
+}
+
+/// Adds the options to `program`. The import runs when they are parsed. Errors are exceptions: CLI::Error and
+/// std::invalid_argument where the user's input is wrong.
+void add_import_options(CLI::App& program, Progress& progress) {
+  const std::string usual_group = program.option_defaults()->get_group();
+  const auto options = std::make_shared<ImportOptions>();
+  add_what(program, *options);
+  add_where(program, *options);
+  program.option_defaults()->group(usual_group);
+  program
+      .add_option("FILE", options->settings.files,
+                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .pvd .vtkhdf), XDMF (.xdmf .xmf), "
+                  "EnSight (.case), ExodusII (.ex2 .exo .e .g), CGNS "
+                  "(.cgns), an OpenFOAM "
+                  "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), MetaImage (.mha "
+                  ".mhd), MRtrix (.mif .mif.gz .mih), NumPy (.npy); "
+                  "of PLOT3D two, the grid and its q")
+      ->required()
+      ->expected(1, 2)
+      ->option_text("FILE...");
+  program.add_option("-o,--output", options->output, "The field to write, FILE.vdb")
+      ->required()
+      ->check(check_vdb_output)
+      ->option_text("FILE");
+  program
+      .add_option("--boundary", options->boundary,
+                  "Write the surface of the body that the mesh lies around, for `obstacles`: FILE.ply")
+      ->check(check_ply_output)
+      ->option_text("FILE");
+  program
+      .add_option(
+          "--steps", options->steps,
+          "Steps of time, of files that have some: last, first, a number from 1 on, or all, each in a file of its own "
+          "(-o flow.####.vdb) (last)")
+      ->option_text("STEPS");
+  program
+      .add_option("--memory", options->memory,
+                  "Keep voxels in files on the disk of the output, of which the system has in memory what is free, "
+                  "whatever the size, as 8G or 500M")
+      ->transform(CLI::AsSizeValue(false))
+      ->check([](const std::string& bytes) {  // CLI11 makes large numbers of negative ones.
+        const bool is_size = bytes.find('-') == std::string::npos && bytes.size() <= 18;
+        return is_size ? "" : "it must be a size, as 8G";
+      })
+      ->option_text("SIZE");
+  program.add_option("--name", options->name, "Name of the field (default: the array's)");
+  program.add_option("--units", options->units, "Units of the tensor, noted in the file");
+  program.add_flag("--half", options->half, "Store 16-bit floats: three significant digits, half the size");
+  program.add_flag("-q,--quiet", options->quiet, "No progress bar");
+  program.add_flag("--tell-progress", options->tells_progress)->group("");  // For the Python package.
+  program.callback([options, &progress] { import(*options, progress); });
+}
+
 int read_vtp(int argc, char** argv) {
-  return tensorray::answer_parent([&] {
+  return answer_parent([&] {
     if (argc < 4) throw std::runtime_error("--read-vtp is for tensorray alone");
     const std::set<std::string> wanted(argv + 4, argv + argc);
-    tensorray::write_poly_lines(argv[2], tensorray::read_vtp_file(argv[3], wanted));
+    write_poly_lines(argv[2], read_vtp_file(argv[3], wanted));
   });
 }
 
 }  // namespace
+}  // namespace tensorray
 
 int main(int argc, char** argv) {
   tensorray::open_standard_streams();
   const std::string first = argc > 1 ? argv[1] : "";
-  if (first == "--read-vtp") return read_vtp(argc, argv);
+  if (first == "--read-vtp") return tensorray::read_vtp(argc, argv);
   tensorray::Progress& progress = tensorray::progress_until_interrupted();
   CLI::App app("Make a tensor field of another program's file", "tensorray import");
   tensorray::add_import_options(app, progress);

@@ -23,17 +23,9 @@ struct Piece {
 
 /// The power of (1 − c) in the density along each collapsed axis.
 std::array<int, 3> powers(Shape shape) {
-  switch (shape) {
-    case Shape::simplex:
-      return {0, 1, 2};
-    case Shape::prism:
-      return {0, 1, 0};
-    case Shape::collapsed_pyramid:
-    case Shape::pyramid:
-      return {0, 0, 2};
-    default:
-      return {0, 0, 0};
-  }
+  if (shape == Shape::simplex) return {0, 1, 2};
+  if (shape == Shape::prism) return {0, 1, 0};
+  return {0, 0, shape == Shape::collapsed_pyramid || shape == Shape::pyramid ? 2 : 0};
 }
 
 /// ∫ (1 − c)^k dc over an interval.

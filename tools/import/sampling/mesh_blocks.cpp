@@ -1,5 +1,3 @@
-#include "tools/import/sampling/mesh_blocks.h"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -14,6 +12,7 @@
 
 #include "tools/import/meshes/mesh_cell.h"
 #include "tools/import/sampling/cell_parts.h"
+#include "tools/import/sampling/sampling_lattice.h"
 #include "tools/import/sampling/voxel_average.h"
 
 namespace tensorray {
@@ -134,7 +133,6 @@ void fill_from_cell(const MeshSource& source, MeshCell& cell, vtkIdType id, Tens
       }
 }
 
-/// The tensors at the centres of the block's voxels.
 void fill_centres(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, MeshCell& cell,
                   TensorBlock& block) {
   Voxels taken;
@@ -142,7 +140,6 @@ void fill_centres(const MeshSource& source, const vtkIdType* begin, const vtkIdT
     if (load(source, cell, *id)) fill_from_cell(source, cell, *id, block, taken);
 }
 
-/// How a cell is averaged.
 struct AveragedCell {
   vtkIdType id = 0;
   double fineness = 0;             ///< How far its voxels are: from 0 (no part of their values) to 1 (all of it).

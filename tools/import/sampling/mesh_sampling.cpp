@@ -13,9 +13,7 @@
 #include <vtkDoubleArray.h>
 #include <vtkPointData.h>
 
-#include "tools/import/meshes/mesh_solid.h"
 #include "tools/import/meshes/mesh_tensors.h"
-#include "tools/import/sampling/mesh_blocks.h"
 #include "tools/import/sampling/sampling_lattice.h"
 #include "volumes/grids/page_memory.h"
 

@@ -1,6 +1,7 @@
 #include "tools/import/sampling/sampling_lattice.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -70,6 +71,35 @@ void require_two(int count) {
 }
 
 }  // namespace
+
+Solid solid_part(vtkDataSet& mesh) {
+  Solid solid;
+  const vtkIdType count = mesh.GetNumberOfCells();
+  solid.boxes.resize(static_cast<std::size_t>(count));
+  solid.thickness.resize(solid.boxes.size());
+  std::vector<AlignedBox3d> hulls(solid.boxes.size());
+  std::vector<std::atomic<bool>> used(static_cast<std::size_t>(mesh.GetNumberOfPoints()));
+  MeshCell first;
+  if (count > 0) first.load(mesh, 0);  // makes VTK's cached data on one thread
+  tbb::parallel_for(CellRange(0, count, 256), [&](const CellRange& range) {
+    MeshCell cell;
+    for (vtkIdType id = range.begin(); id < range.end(); ++id) {
+      if (!cell.load(mesh, id)) continue;
+      solid.boxes[static_cast<std::size_t>(id)] = cell.box();
+      solid.thickness[static_cast<std::size_t>(id)] = static_cast<float>(cell.thickness(Vector3d::Ones()));
+      for (int i = 0; i < cell.points(); ++i) {
+        hulls[static_cast<std::size_t>(id)].extend(cell.positions().col(i));
+        used[static_cast<std::size_t>(cell.point(i))].store(true, std::memory_order_relaxed);
+      }
+    }
+  });
+  for (const AlignedBox3d& hull : hulls) solid.bounds.extend(hull);
+  solid.points.assign(used.begin(), used.end());
+  if (solid.bounds.isEmpty())
+    throw std::invalid_argument(
+        "the mesh has no three-dimensional cells (it is flat, or points alone): a field needs tensors in a volume");
+  return solid;
+}
 
 AlignedBox3d sampled_box(const Solid& solid, const SamplingSettings& settings) {
   AlignedBox3d box = settings.bounds.value_or(solid.bounds);

@@ -1,13 +1,26 @@
 #pragma once
 /// @file tools/import/sampling/sampling_lattice.h
-/// The lattice of voxels at which a mesh is sampled.
+/// What of a mesh is sampled, the lattice of voxels at which it is, and the blocks of the grid that result.
+
+#include <vector>
 
 #include <Eigen/Geometry>
 
-#include "tools/import/meshes/mesh_solid.h"
 #include "tools/import/sampling/mesh_sampling.h"
 
 namespace tensorray {
+
+/// The three-dimensional part of a mesh.
+struct Solid {
+  std::vector<Eigen::AlignedBox3d> boxes;  ///< Box of each cell of the mesh; empty for cells that are not used.
+  std::vector<float> thickness;            ///< Of each used cell, world units: MeshCell::thickness.
+  Eigen::AlignedBox3d bounds;              ///< Bounds of the points of the used cells.
+  std::vector<bool> points;                ///< For each point of the mesh: whether a used cell has it.
+};
+
+/// Uses all threads. Afterwards several threads may load cells of `mesh`.
+/// @throw std::invalid_argument if the mesh has no three-dimensional cells.
+Solid solid_part(vtkDataSet& mesh);
 
 struct SamplingLattice {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< Centre of the first voxel.
@@ -24,5 +37,18 @@ Eigen::AlignedBox3d sampled_box(const Solid& solid, const SamplingSettings& sett
 
 /// @throw std::invalid_argument as sample_mesh.
 SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const SamplingSettings& settings);
+
+/// What blocks are filled from.
+struct MeshSource {
+  vtkDataSet& mesh;
+  const double* point_tensors;  ///< Nine for each point; null: a cell has its tensor everywhere.
+  const double* cell_tensors;   ///< Nine for each cell; may be null. Cells whose tensor is not finite are left out.
+  const Solid& solid;
+  const SamplingLattice& lattice;
+  double tolerance;  ///< Distance from a cell below which a voxel's centre is in it.
+};
+
+/// The blocks that may have active voxels, as sample_mesh (mesh_sampling.h) describes them, ordered by origin.
+TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress);
 
 }  // namespace tensorray

@@ -2,7 +2,9 @@
 /// @file tools/import/sampling/voxel_average.h
 /// The average of a tensor field over the part of a voxel that a mesh fills.
 
-#include <Eigen/Core>
+#include <algorithm>
+
+#include <Eigen/Cholesky>
 
 namespace tensorray {
 
@@ -12,7 +14,14 @@ class VoxelAverage {
   using Tensor = Eigen::Matrix<double, 9, 1>;
 
   /// @param weight  The volume of which the sample is the value; > 0.
-  void add(const Eigen::Vector3d& position, double weight, const Tensor& tensor);
+  void add(const Eigen::Vector3d& position, double weight, const Tensor& tensor) {
+    weight_ += weight;
+    first_ += weight * position;
+    second_.noalias() += (weight * position) * position.transpose();
+    sum_ += weight * tensor;
+    mixed_.noalias() += (weight * tensor) * position.transpose();
+    squares_ += weight * tensor.squaredNorm();
+  }
 
   bool empty() const { return weight_ == 0; }
 
@@ -22,7 +31,21 @@ class VoxelAverage {
   /// variance, not at all if it explains less than 3/4. So a linear field gives its value at the centre, whatever the
   /// samples' positions, and a layer that is thinner than the voxel gives its plain average, as a line fitted to it
   /// says nothing.
-  Tensor value() const;
+  Tensor value() const {
+    // Of a voxel that is filled the variance of positions is 1/12. Less than this is none: samples on a plane or a
+    // line.
+    constexpr double no_variance = 1e-9;
+    const Eigen::Vector3d centroid = first_ / weight_;
+    const Tensor average = sum_ / weight_;
+    Eigen::Matrix3d variance = second_ / weight_ - centroid * centroid.transpose();
+    variance.diagonal().array() += no_variance;
+    const Eigen::Matrix<double, 9, 3> covariance = mixed_ / weight_ - average * centroid.transpose();
+    const Eigen::Matrix<double, 9, 3> gradient = variance.ldlt().solve(covariance.transpose()).transpose();
+    const double all = squares_ / weight_ - average.squaredNorm();
+    const double explained = gradient.cwiseProduct(covariance).sum();
+    const double fraction = all > 0 ? std::clamp(4 * explained / all - 3, 0.0, 1.0) : 0.0;
+    return average - fraction * gradient * centroid;
+  }
 
  private:
   double weight_ = 0, squares_ = 0;

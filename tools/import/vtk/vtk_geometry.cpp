@@ -1,5 +1,3 @@
-#include "tools/import/vtk/vtk_geometry.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,6 +18,8 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
+#include "tools/import/vtk/vtk_data_sets.h"
+
 namespace tensorray {
 namespace {
 
@@ -34,21 +34,18 @@ using Path = std::filesystem::path;
 bool is_coordinate(double x) { return std::abs(x) <= 1e30; }
 
 void check_coordinates(const Path& path, const std::string& name, vtkDataArray* values) {
-  for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i) {
-    for (int axis = 0; axis < values->GetNumberOfComponents(); ++axis) {
-      if (is_coordinate(values->GetComponent(i, axis))) continue;
-      fail_form(path, name + " " + std::to_string(i) + " is not finite, or beyond 1e30");
-    }
-  }
+  for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i)
+    for (int axis = 0; axis < values->GetNumberOfComponents(); ++axis)
+      if (!is_coordinate(values->GetComponent(i, axis)))
+        fail_form(path, name + " " + std::to_string(i) + " is not finite, or beyond 1e30");
 }
 
 void check_image(const Path& path, vtkImageData& image) {
   const double* const bounds = image.GetBounds();
-  if (std::all_of(image.GetSpacing(), image.GetSpacing() + 3, is_coordinate) &&
-      std::all_of(image.GetOrigin(), image.GetOrigin() + 3, is_coordinate) &&
-      std::all_of(bounds, bounds + 6, is_coordinate))
-    return;
-  fail_form(path, "its origin or spacing is not finite, or beyond 1e30");
+  if (!std::all_of(image.GetSpacing(), image.GetSpacing() + 3, is_coordinate) ||
+      !std::all_of(image.GetOrigin(), image.GetOrigin() + 3, is_coordinate) ||
+      !std::all_of(bounds, bounds + 6, is_coordinate))
+    fail_form(path, "its origin or spacing is not finite, or beyond 1e30");
 }
 
 /// A legacy file may hold fewer points or coordinates than its dimensions announce.

@@ -10,7 +10,6 @@
 #include <vtkCommand.h>
 #include <vtkLogger.h>
 #include <vtkNew.h>
-#include <vtkObject.h>
 #include <vtkOutputWindow.h>
 
 namespace tensorray {
@@ -83,9 +82,5 @@ void VtkMessages::keep(const char* message, bool is_error) {
 void VtkMessages::throw_error(const std::filesystem::path& path) const {
   if (!error_.empty()) throw std::runtime_error(path.string() + ": VTK cannot read it: " + error_);
 }
-
-SilentVtk::SilentVtk() : before_(vtkObject::GetGlobalWarningDisplay()) { vtkObject::GlobalWarningDisplayOff(); }
-
-SilentVtk::~SilentVtk() { vtkObject::SetGlobalWarningDisplay(before_); }
 
 }  // namespace tensorray

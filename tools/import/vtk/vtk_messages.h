@@ -40,17 +40,4 @@ class VtkMessages {
   Descriptor stderr_;  ///< What standard error was.
 };
 
-/// Until it is destroyed, drops VTK's errors and warnings. Use it for work on data that have been read, where VTK
-/// reports every flat cell. Several threads may use VTK meanwhile.
-class SilentVtk {
- public:
-  SilentVtk();
-  ~SilentVtk();
-  SilentVtk(const SilentVtk&) = delete;
-  SilentVtk& operator=(const SilentVtk&) = delete;
-
- private:
-  int before_;
-};
-
 }  // namespace tensorray

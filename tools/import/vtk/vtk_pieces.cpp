@@ -1,5 +1,3 @@
-#include "tools/import/vtk/vtk_pieces.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -26,7 +24,8 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
-#include "tools/import/lattices/component_names.h"
+#include "tools/import/lattices/tensor_order.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
 namespace {
@@ -36,9 +35,8 @@ void collect(vtkDataObject* data, DataSets& pieces) {
   if (auto* const tree = vtkCompositeDataSet::SafeDownCast(data)) {
     vtkSmartPointer<vtkCompositeDataIterator> leaf;
     leaf.TakeReference(tree->NewIterator());
-    for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem()) {
+    for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem())
       collect(leaf->GetCurrentDataObject(), pieces);
-    }
   } else if (auto* const set = vtkDataSet::SafeDownCast(data); set && set->GetNumberOfCells() > 0) {
     pieces.emplace_back().TakeReference(set->NewInstance());
     pieces.back()->ShallowCopy(set);
@@ -92,9 +90,8 @@ vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
       is_unused = is_unused || (points->GetValue(ids->GetId(i)) & vtkDataSetAttributes::HIDDENPOINT) != 0;
     marks->InsertNextValue(is_unused ? copy : used);
   }
-  for (vtkDataSetAttributes* const data : {static_cast<vtkDataSetAttributes*>(piece.GetPointData()),
-                                           static_cast<vtkDataSetAttributes*>(piece.GetCellData())})
-    data->RemoveArray(vtkDataSetAttributes::GhostArrayName());
+  for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL})
+    piece.GetAttributes(type)->RemoveArray(vtkDataSetAttributes::GhostArrayName());
   vtkNew<vtkAppendFilter> to_unstructured;
   to_unstructured->AddInputData(&piece);
   to_unstructured->Update();
@@ -124,17 +121,11 @@ std::map<std::string, SameArrays> arrays_of(const DataSets& pieces, vtkDataObjec
 
 /// The type in which all of them can be one array. NaN stands for what is missing.
 int common_type(const SameArrays& arrays) {
-  vtkDataArray* first = nullptr;
-  bool is_missing = false, is_same = true;
-  for (const auto& array : arrays) {
-    is_missing = is_missing || !array;
-    if (!array) continue;
-    if (!first) first = array;
-    is_same = is_same && array->GetDataType() == first->GetDataType();
-  }
-  const int type = first->GetDataType();
-  const bool is_real = type == VTK_FLOAT || type == VTK_DOUBLE;
-  return is_same && (is_real || !is_missing) ? type : VTK_DOUBLE;
+  std::set<int> types;
+  for (const auto& array : arrays) types.insert(array ? array->GetDataType() : VTK_VOID);
+  const bool is_missing = types.erase(VTK_VOID) > 0;
+  const bool is_real = *types.begin() == VTK_FLOAT || *types.begin() == VTK_DOUBLE;
+  return types.size() == 1 && (is_real || !is_missing) ? *types.begin() : VTK_DOUBLE;
 }
 
 /// Whether arrays name their components, but not all alike.
@@ -217,7 +208,6 @@ void take_known_values(vtkUnstructuredGrid& all, const DataSets& pieces,
   }
 }
 
-/// The names of the numeric arrays at points.
 std::set<std::string> point_arrays(vtkDataSet& piece) {
   std::set<std::string> names;
   for (int i = 0; i < piece.GetPointData()->GetNumberOfArrays(); ++i)
@@ -227,8 +217,8 @@ std::set<std::string> point_arrays(vtkDataSet& piece) {
 }
 
 bool is_same_image(vtkImageData& a, vtkImageData& b) {
-  const double *const of_a = a.GetIndexToPhysicalMatrix()->GetData(), *const of_b =
-                                                                          b.GetIndexToPhysicalMatrix()->GetData();
+  const double* const of_a = a.GetIndexToPhysicalMatrix()->GetData();
+  const double* const of_b = b.GetIndexToPhysicalMatrix()->GetData();
   return std::equal(a.GetExtent(), a.GetExtent() + 6, b.GetExtent()) && std::equal(of_a, of_a + 16, of_b);
 }
 

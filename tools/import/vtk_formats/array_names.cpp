@@ -15,7 +15,7 @@
 #include <vtk_exodusII.h>
 
 #include "base/text/text.h"
-#include "tools/import/lattices/component_names.h"
+#include "tools/import/lattices/tensor_order.h"
 
 namespace tensorray {
 namespace {
@@ -31,12 +31,8 @@ std::string decoded(const std::string& name) {
     const bool is_code = name[i] == '%' && i + 2 < name.size() &&
                          std::isxdigit(static_cast<unsigned char>(name[i + 1])) &&
                          std::isxdigit(static_cast<unsigned char>(name[i + 2]));
-    if (is_code) {
-      text += static_cast<char>(std::stoi(name.substr(i + 1, 2), nullptr, 16));
-      i += 2;
-    } else {
-      text += name[i];
-    }
+    text += is_code ? static_cast<char>(std::stoi(name.substr(i + 1, 2), nullptr, 16)) : name[i];
+    if (is_code) i += 2;
   }
   return text;
 }

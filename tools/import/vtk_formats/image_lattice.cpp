@@ -28,43 +28,33 @@ struct Source {
 };
 
 Eigen::Vector3i size_of(vtkImageData& image, bool of_cells) {
-  Eigen::Vector3i size;
-  image.GetDimensions(size.data());
+  Eigen::Vector3i size(image.GetDimensions());
   if (of_cells) size = (size.array() - 1).max(1);  // along an axis with one point, VTK's cells are flat
   return size;
 }
 
 /// The edges of a voxel, as columns. If a flat image has no thickness, its thinnest other edge is used.
 Eigen::Matrix3d edges_of(vtkImageData& image) {
-  Eigen::Vector3d spacing;
-  image.GetSpacing(spacing.data());
+  Eigen::Vector3d spacing(image.GetSpacing());
   double thinnest = std::numeric_limits<double>::infinity();
-  for (const double edge : spacing) {
+  for (const double edge : spacing)
     if (edge != 0) thinnest = std::min(thinnest, std::abs(edge));
-  }
-  Eigen::Vector3i size;
-  image.GetDimensions(size.data());
-  for (int axis = 0; axis < 3; ++axis) {
-    if (spacing[axis] == 0 && size[axis] == 1) spacing[axis] = thinnest;
-  }
+  for (int axis = 0; axis < 3; ++axis)
+    if (spacing[axis] == 0 && image.GetDimensions()[axis] == 1) spacing[axis] = thinnest;
   const double* const direction = image.GetDirectionMatrix()->GetData();
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(direction) * spacing.asDiagonal();
 }
 
 Eigen::Affine3d to_world_of(vtkImageData& image, bool of_cells) {
-  Eigen::Vector3i dimensions;
-  image.GetDimensions(dimensions.data());
   Eigen::Vector3d first;
-  for (int axis = 0; axis < 3; ++axis) {
-    first[axis] = image.GetExtent()[2 * axis] + (of_cells && dimensions[axis] > 1 ? 0.5 : 0.0);
-  }
+  for (int axis = 0; axis < 3; ++axis)
+    first[axis] = image.GetExtent()[2 * axis] + (of_cells && image.GetDimensions()[axis] > 1 ? 0.5 : 0.0);
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
   to_world.linear() = edges_of(image);
   to_world.translation() = Eigen::Map<const Eigen::Vector3d>(image.GetOrigin()) + to_world.linear() * first;
   const double volume = to_world.linear().determinant();
-  if (volume == 0 || !std::isfinite(volume) || !to_world.translation().allFinite()) {
+  if (volume == 0 || !std::isfinite(volume) || !to_world.translation().allFinite())
     throw std::runtime_error("the image's spacing, direction or origin is zero or not finite; write it again");
-  }
   return to_world;
 }
 
@@ -95,16 +85,13 @@ std::vector<bool> hidden_voxels(vtkImageData& image, bool of_cells) {
 void read_slice(Source& source, int z, double* out) {
   const vtkIdType begin = z * source.slice, end = begin + source.slice;
   vtkDataArray& values = *source.values;
-  if (end > values.GetNumberOfTuples()) {
+  if (end > values.GetNumberOfTuples())
     throw std::logic_error("read_slice: slices are read once, from the last to the first");
-  }
   const int components = values.GetNumberOfComponents();
   for (vtkIdType i = begin; i < end; ++i, out += components) {
-    if (!source.hidden.empty() && source.hidden[static_cast<std::size_t>(i)]) {
+    values.GetTuple(i, out);
+    if (!source.hidden.empty() && source.hidden[static_cast<std::size_t>(i)])
       std::fill(out, out + components, std::numeric_limits<double>::quiet_NaN());
-    } else {
-      values.GetTuple(i, out);
-    }
   }
   // Resize keeps the front of the array, and returns whole pages to the system.
   if (values.GetReferenceCount() == 1) values.Resize(begin);
@@ -118,16 +105,14 @@ Lattice lattice_of(vtkSmartPointer<vtkImageData> image, vtkSmartPointer<vtkDataA
   lattice.to_world = to_world_of(*image, of_cells);
   if (values->GetName()) lattice.array = values->GetName();
   lattice.components = values->GetNumberOfComponents();
-
   const auto source = std::make_shared<Source>();
   source->slice = static_cast<vtkIdType>(lattice.size.x()) * lattice.size.y();
   source->hidden = hidden_voxels(*image, of_cells);
   source->values = std::move(values);
-  if (source->values->GetNumberOfTuples() != source->slice * lattice.size.z()) {
+  if (source->values->GetNumberOfTuples() != source->slice * lattice.size.z())
     throw std::runtime_error("the array '" + lattice.array + "' has " +
                              std::to_string(source->values->GetNumberOfTuples()) + " values for an image of " +
                              std::to_string(source->slice * lattice.size.z()) + " voxels; write the file again");
-  }
   lattice.read_slice = [source](int z, double* out) { read_slice(*source, z, out); };
   return lattice;
 }

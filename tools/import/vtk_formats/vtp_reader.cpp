@@ -16,7 +16,7 @@
 
 #include "base/process/process_limits.h"
 #include "base/text/text.h"
-#include "tools/import/vtk/mesh_file.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk_formats/vtk_tags.h"
 #include "tools/import/vtk_formats/vtp_files.h"

@@ -1,5 +1,3 @@
-#include "tools/import/vtk_source/find_format.h"
-
 #include <algorithm>
 #include <array>
 #include <fstream>
@@ -14,13 +12,13 @@
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "tools/import/vtk_formats/vtk_tags.h"
+#include "tools/import/vtk_source/mesh_formats.h"
 
 namespace tensorray {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The format whose XML has a type; null if none has.
 const MeshFormat* format_of_type(const std::string& type) {
   for (const MeshFormat& format : mesh_formats())
     if (format.xml_type == type) return &format;
@@ -56,7 +54,6 @@ bool is_ensight(const std::string& head) {
   return false;
 }
 
-/// Null if they tell none.
 const MeshFormat* format_of_contents(const fs::path& path, const std::string& head) {
   const std::string ending = lower_case_ending(path);
   if (starts_with(head, "# vtk DataFile Version")) return format_with_ending(".vtk");
@@ -133,23 +130,23 @@ void check_pieces(const fs::path& path, const MeshFormat& whole) {
 
 /// For formats that others convert: how. Empty for all others.
 std::string way_out(const std::string& ending, const std::string& name) {
-  const auto one_of = [&](std::initializer_list<const char*> endings) {
-    return std::any_of(endings.begin(), endings.end(), [&](const char* e) { return ending == e; });
-  };
-  if (one_of({".msh"}))
-    return "is a mesh of Gmsh, which is not read; run `meshio convert " + name + " FILE.vtu` (Debian's meshio-tools)";
-  if (one_of({".med"}))
-    return "is a file of MED (Salome, Code_Aster), which is not read; run `meshio convert " + name +
-           " FILE.vtk` (Debian's meshio-tools and python3-h5py)";
-  if (one_of({".frd"}))
-    return "is a result of CalculiX, which is not read; convert it to .vtu with ccx2paraview, or in FreeCAD (export "
-           "its Results)";
-  if (one_of({".npz"}))
-    return "holds several arrays of NumPy; save the one of the tensors: numpy.save(\"FILE.npy\", numpy.load(\"" + name +
-           "\")[NAME])";
-  if (one_of({".dat", ".plt", ".tec", ".szplt"}))
-    return "may be a file of Tecplot, which is not read; open it in ParaView (File > Open, Tecplot reader) and save it "
-           "as .vtu, or .vtm if it has several blocks";
+  const std::pair<std::vector<std::string>, std::string> ways[] = {
+      {{".msh"},
+       "is a mesh of Gmsh, which is not read; run `meshio convert " + name + " FILE.vtu` (Debian's meshio-tools)"},
+      {{".med"},
+       "is a file of MED (Salome, Code_Aster), which is not read; run `meshio convert " + name +
+           " FILE.vtk` (Debian's meshio-tools and python3-h5py)"},
+      {{".frd"},
+       "is a result of CalculiX, which is not read; convert it to .vtu with ccx2paraview, or in FreeCAD (export its "
+       "Results)"},
+      {{".npz"},
+       "holds several arrays of NumPy; save the one of the tensors: numpy.save(\"FILE.npy\", numpy.load(\"" + name +
+           "\")[NAME])"},
+      {{".dat", ".plt", ".tec", ".szplt"},
+       "may be a file of Tecplot, which is not read; open it in ParaView (File > Open, Tecplot reader) and save it as "
+       ".vtu, or .vtm if it has several blocks"}};
+  for (const auto& [endings, way] : ways)
+    if (std::count(endings.begin(), endings.end(), ending) > 0) return way;
   return {};
 }
 

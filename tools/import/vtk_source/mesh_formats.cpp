@@ -26,12 +26,9 @@
 #include "base/text/short_lines.h"
 #include "base/text/text.h"
 #include "tools/import/cases/ensight.h"
-#include "tools/import/cases/openfoam_fields.h"
-#include "tools/import/cases/openfoam_parts.h"
-#include "tools/import/hdf5/vtkhdf.h"
-#include "tools/import/hdf5/xdmf.h"
-#include "tools/import/vtk/vtk_geometry.h"
-#include "tools/import/vtk/vtk_pieces.h"
+#include "tools/import/cases/openfoam.h"
+#include "tools/import/hdf5/hdf5_meshes.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk_formats/array_names.h"
 #include "tools/import/vtk_formats/netcdf_end.h"
 #include "tools/import/vtk_formats/vtk_tags.h"
@@ -145,7 +142,6 @@ MeshFile open_cgns(const Path& path) {
           }};
 }
 
-/// The name of a block; empty if it has none.
 std::string block_name(vtkMultiBlockDataSet& blocks, unsigned int index) {
   const char* const name =
       blocks.HasMetaData(index) ? blocks.GetMetaData(index)->Get(vtkCompositeDataSet::NAME()) : nullptr;
@@ -211,16 +207,6 @@ MeshFile open_openfoam(const Path& path) {
           [parts](int step) { return read_regions(parts, parts.times[static_cast<std::size_t>(step)]); }};
 }
 
-/// EnSight's symmetric tensors are in VTK's order.
-MeshFile open_ensight_case(const Path& path) {
-  const MeshFile file = open_ensight(path);
-  return {file.steps, [file](int step) {
-            auto data = file.read(step);
-            for (vtkDataSet* const part : data_sets_in(data)) name_symmetric_components(*part);
-            return data;
-          }};
-}
-
 }  // namespace
 
 const std::vector<MeshFormat>& mesh_formats() {
@@ -237,7 +223,7 @@ const std::vector<MeshFormat>& mesh_formats() {
       {"an ExodusII file", "", {".ex2", ".exo", ".e", ".g"}, open_exodus},
       {"a CGNS file", "", {".cgns"}, open_cgns},
       {"an OpenFOAM case", "", {".foam"}, open_openfoam, true},
-      {"a case of EnSight", "", {".case", ".encas"}, open_ensight_case, true},
+      {"a case of EnSight", "", {".case", ".encas"}, open_ensight, true},
       {"an XDMF file", "", {".xdmf", ".xmf", ".xdmf2", ".xdmf3"}, open_xdmf, true},
       {"a VTKHDF file", "", {".vtkhdf", ".hdf"}, open_vtkhdf, true},
       {"a VTK multi-block file", "vtkMultiBlockDataSet", {".vtm"}},

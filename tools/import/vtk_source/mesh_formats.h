@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/import/vtk/mesh_file.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
 
@@ -24,6 +24,14 @@ const std::vector<MeshFormat>& mesh_formats();
 
 /// The format that has an ending; null if none has.
 const MeshFormat* format_with_ending(const std::string& ending);
+
+/// The format of a file, or of a folder (an OpenFOAM case), from its first bytes, not only from its name. Finds damage
+/// that is cheap to find before VTK reads the file.
+/// @throw std::runtime_error naming the file: missing; empty; of no format; an ending that belongs to another format;
+/// an XML image whose origin or spacing is not finite numbers; cut off (an XML file without its end; a piece that is
+/// missing, cut off or of another format); an image, rectilinear or structured grid whose pieces do not cover its
+/// extent.
+const MeshFormat& find_format(const std::filesystem::path& path);
 
 /// The files that a file in pieces lists, in that order.
 std::vector<std::filesystem::path> piece_files(const std::filesystem::path& path);

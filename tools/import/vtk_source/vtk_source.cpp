@@ -18,11 +18,10 @@
 #include "base/errors.h"
 #include "base/process/process_limits.h"
 #include "base/text/text.h"
-#include "tools/import/vtk/vtk_geometry.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk/vtk_messages.h"
-#include "tools/import/vtk/vtk_pieces.h"
 #include "tools/import/vtk_formats/array_names.h"
-#include "tools/import/vtk_source/find_format.h"
+#include "tools/import/vtk_source/mesh_formats.h"
 
 namespace tensorray {
 namespace {

@@ -22,9 +22,9 @@ namespace tensorray {
 /// OpenFOAM's files) is read in VTK's order, with its components named XX YY ZZ XY YZ XZ. A
 /// volTensorField is read as it is: OpenFOAM's grad(U) is ∂_i u_j, the transpose of this program's gradients. Points
 /// of an ExodusII mesh are not displaced. Images stay vtkImageData, and structured and rectilinear grids keep their
-/// type, also if they are in pieces. Ghosts: see vtk_pieces.h. The kind is found from the contents where they state
+/// type, also if they are in pieces. Ghosts: see vtk_data_sets.h. The kind is found from the contents where they state
 /// it; a wrong ending is an error that names both kinds. On damaged files VTK's readers may end the process or never
-/// return: call this in a child process (child_process.h). The result has passed check_geometry (vtk_geometry.h).
+/// return: call this in a child process (child_process.h). The result has passed check_geometry (vtk_data_sets.h).
 /// @param step  Of the steps of time, from 0 on; none: the last one.
 /// @throw std::runtime_error, one line with the file and the fix; it includes the messages that VTK would print.
 vtkSmartPointer<vtkDataSet> read_vtk_source(const std::filesystem::path& path, std::optional<int> step = std::nullopt);

@@ -1,10 +1,12 @@
 #pragma once
-/// @file tools/import/cases/openfoam_parts.h
-/// The folders of an OpenFOAM case: regions, and the parts that processors wrote.
+/// @file tools/import/cases/openfoam.h
+/// The folders of an OpenFOAM case, regions and the parts that processors wrote, and the order of its tensors.
 
 #include <filesystem>
 #include <string>
 #include <vector>
+
+class vtkDataSet;
 
 namespace tensorray {
 
@@ -34,5 +36,12 @@ OpenFoamParts openfoam_parts(const std::filesystem::path& path, const std::files
 /// @throw std::runtime_error naming the file: a collated file is damaged.
 std::vector<std::filesystem::path> processor_cases(const OpenFoamParts& parts, const OpenFoamTime& time,
                                                    const std::filesystem::path& target);
+
+/// Gives symmetric tensors that are `uniform` in their files VTK's order. OpenFOAM writes xx xy xz yy yz zz; VTK
+/// changes lists to its own order, xx yy zz xy yz xz, but not what is uniform. Fields whose values are not in the file
+/// itself (macros, #include) are taken as uniform if they are the same in all cells. Arrays whose components have names
+/// are left alone.
+/// @param time  The folder of the time that was read.
+void correct_uniform_tensors(vtkDataSet& data, const std::filesystem::path& time);
 
 }  // namespace tensorray
