@@ -14,7 +14,7 @@
 #include "integrators/photon_distribution/fluence.h"
 #include "renderer/density/density.h"
 #include "renderer/film/plate_photon.h"
-#include "tracing/bending/light_channel.h"
+#include "tracing/bending/bending.h"
 
 namespace tensorray {
 

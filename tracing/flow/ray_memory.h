@@ -28,8 +28,6 @@ class RayMemory {
   void trace(const TensorField& field, const Geometry& volume, const Geometry& geometry,
              const BendingSettings& settings, RayBatch& batch);
 
-  std::size_t size() const { return exits_.size(); }
-
  private:
   /// A ray that left the volume, or ended in it.
   struct Exit {
@@ -38,17 +36,11 @@ class RayMemory {
     RayEnd end;
   };
   using Key = std::array<double, 4>;  // Start and flexibility.
-
   struct Hash {
     std::size_t operator()(const Key& key) const;
   };
 
-  static Key key_of(const RayBatch& batch, std::size_t ray);
-
   tbb::concurrent_unordered_map<Key, Exit, Hash> exits_;
 };
-
-/// `geometry` without its plate.
-Geometry without_plate(const Geometry& geometry);
 
 }  // namespace tensorray

@@ -9,8 +9,7 @@
 #include <Eigen/Core>
 
 #include "tracing/kernels/packet_kernel.h"
-#include "tracing/steps/composition.h"
-#include "tracing/steps/step_lengths.h"
+#include "tracing/steps/methods.h"
 #include "volumes/bricks/brick_layout.h"
 
 namespace tensorray::packets {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "tracing/bending/ray_record.h"
+#include "tracing/bending/bending.h"
 
 namespace tensorray {
 

@@ -9,7 +9,6 @@
 #include "base/process/progress.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
-#include "tracing/bending/ray_record.h"
 
 namespace tensorray {
 

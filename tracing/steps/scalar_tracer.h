@@ -11,7 +11,6 @@
 
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
-#include "tracing/bending/ray_record.h"
 #include "tracing/steps/bending_steps.h"
 #include "volumes/sampling/tensor_sampler.h"
 
