@@ -55,12 +55,6 @@ PathPoint path_point(const TensorField& field, const RayRecord& record, std::siz
                                  : record.behind[i - record.steps.size()];
 }
 
-void RayRecord::clear() {
-  before.clear();
-  steps.clear();
-  behind.clear();
-}
-
 SideFaces::SideFaces(const TensorField& field, const Eigen::Vector3d& direction) : field_(field) {
   std::array<double, 6> cosines{};
   for (int axis = 0; axis < 3; ++axis) {

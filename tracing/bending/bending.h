@@ -161,7 +161,6 @@ struct RayRecord {
   PathPoints behind;             ///< The last points.
 
   std::size_t size() const { return before.size() + steps.size() + behind.size(); }
-  void clear();  ///< Keeps the memory.
 };
 
 /// Point i of the ray, without its tensor.

@@ -62,12 +62,6 @@ double first_size(const TensorField& field, const Beam& beam, double pixel, cons
   return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
 }
 
-Geometry extended(const Geometry& geometry) {
-  Surfaces surfaces = geometry.surfaces();
-  surfaces.plate->size *= 1 + 2 * margin;
-  return Geometry(std::move(surfaces));
-}
-
 /// What the landings of a vertex depend on, beside the map's settings: where its light starts, and a hash of the
 /// landings of its parents.
 using VertexKey = std::array<std::uint64_t, 3>;
@@ -544,10 +538,12 @@ int band_count(const FlowMap& map, int channels, const BandStep& step) {
 FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Beam& beam,
                        const BendingSettings& bending, const FlowSettings& settings, const Progress& progress) {
   if (!settings.plate) {
-    if (!geometry.surfaces().plate) throw std::invalid_argument("a flow map needs a receiver");
+    Surfaces extended = geometry.surfaces();
+    if (!extended.plate) throw std::invalid_argument("a flow map needs a receiver");
     FlowSettings with_plate = settings;
-    with_plate.plate = geometry.surfaces().plate;
-    return trace_flow_map(field, extended(geometry), beam, bending, with_plate, progress);
+    with_plate.plate = extended.plate;
+    extended.plate->size *= 1 + 2 * margin;
+    return trace_flow_map(field, Geometry(std::move(extended)), beam, bending, with_plate, progress);
   }
   if (settings.flexibilities.empty() || (settings.range && settings.flexibilities.size() != 2))
     throw std::invalid_argument("a flow map needs flexibilities, and a range has two");

@@ -369,20 +369,6 @@ void draw_piece(const Drawing& drawing, const FlowPiece& piece, double sample, d
   }
 }
 
-AreaDeposit::PlaneWeights plane_weights_of(const Pass& pass, const BandRun& run) {
-  AreaDeposit::PlaneWeights plane_weights{};
-  for (std::size_t i = run.first; i < run.first + run.count; ++i)
-    for (std::size_t k = 0; k < planes; ++k) plane_weights[k] += pass.plane_weights[i][k];
-  return plane_weights;
-}
-
-/// Light without colour has power, too.
-bool counts_power(const Drawing& drawing, const Pass& pass, const BandRun& run) {
-  const auto first = drawing.bands.begin() + static_cast<std::ptrdiff_t>(run.first);
-  return std::any_of(first, first + static_cast<std::ptrdiff_t>(run.count),
-                     [&](const CausticBand& band) { return pass.counts(band); });
-}
-
 void add_power(const Drawing& drawing, const Pass& pass, const BandRun& run, const Power& power, PowerSums& sums) {
   for (std::size_t i = run.first; i < run.first + run.count; ++i) {
     const CausticBand& band = drawing.bands[i];
@@ -397,8 +383,13 @@ void add_power(const Drawing& drawing, const Pass& pass, const BandRun& run, con
 void draw_group(const Drawing& drawing, const Pass& pass, std::size_t group, bool counts, Worker& worker) {
   for (const FlowPiece& piece : PieceBuilder(drawing.pieces, group).build())
     for (const BandRun& run : runs_at(piece.detail, drawing.bands)) {
-      const AreaDeposit::PlaneWeights plane_weights = plane_weights_of(pass, run);
-      if (plane_weights == AreaDeposit::PlaneWeights{} && !(counts && counts_power(drawing, pass, run))) continue;
+      AreaDeposit::PlaneWeights plane_weights{};
+      bool has_power = false;  // Light without colour has power, too.
+      for (std::size_t i = run.first; i < run.first + run.count; ++i) {
+        for (std::size_t k = 0; k < planes; ++k) plane_weights[k] += pass.plane_weights[i][k];
+        has_power = has_power || (counts && pass.counts(drawing.bands[i]));
+      }
+      if (plane_weights == AreaDeposit::PlaneWeights{} && !has_power) continue;
       worker.deposit.set_plane_weights(plane_weights);
       Power power{};
       const int parts = std::max(piece.detail, 0) + 1;
