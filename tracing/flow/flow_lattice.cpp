@@ -1,9 +1,7 @@
 #include "tracing/flow/flow_lattice.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 
 #include <tbb/parallel_for.h>
 

@@ -1,7 +1,5 @@
 #include "tracing/flow/flow_map.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -10,7 +8,6 @@
 #include <string_view>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>

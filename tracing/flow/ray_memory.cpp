@@ -5,14 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "base/text/content_hash.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
-
-std::size_t RayMemory::Hash::operator()(const Key& key) const {
-  return content_hash({reinterpret_cast<const char*>(key.data()), sizeof key});
-}
 
 bool RayMemory::serves(const TensorField& field, const Geometry& geometry, const Eigen::Vector3d& direction,
                        const BendingSettings& settings) {

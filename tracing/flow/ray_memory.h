@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <tbb/concurrent_unordered_map.h>
 
+#include "base/text/content_hash.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
 
@@ -37,7 +38,9 @@ class RayMemory {
   };
   using Key = std::array<double, 4>;  // Start and flexibility.
   struct Hash {
-    std::size_t operator()(const Key& key) const;
+    std::size_t operator()(const Key& key) const {
+      return content_hash({reinterpret_cast<const char*>(key.data()), sizeof key});
+    }
   };
 
   tbb::concurrent_unordered_map<Key, Exit, Hash> exits_;

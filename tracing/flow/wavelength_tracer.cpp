@@ -232,17 +232,6 @@ WavelengthTracer::WavelengthTracer(const TensorField& field, const Geometry& geo
   for (std::size_t sample = 0; sample < wavelengths(); sample += step) check_samples_.push_back(sample);
 }
 
-/// Adds a ray for every `step`-th sample of each vertex; after the first time, only for those that are not known yet.
-/// Rays of one sample follow each other: those of neighbouring vertices cross the same cells of the field.
-void WavelengthTracer::add_rays(const std::vector<PartlyTraced>& vertices, bool is_first,
-                                std::vector<SampleRay>& rays) {
-  rays.clear();
-  for (std::size_t sample = 0; sample < range_samples; ++sample)
-    for (const PartlyTraced& each : vertices)
-      if (is_first ? sample % each.step == 0 : sample % (2 * each.step) == each.step && each.prediction.is_open(sample))
-        rays.push_back({each.vertex, sample});
-}
-
 /// Sets the lengths between those of three samples: as far from the mean of two as those of the parents are.
 void WavelengthTracer::predict_lengths(FlowMap& map, std::size_t vertex, const Parents& parents) const {
   const auto missed = [&](std::size_t of, std::size_t check) {
@@ -271,7 +260,13 @@ void WavelengthTracer::trace(FlowMap& map, const std::vector<NewVertex>& vertice
     rest.push_back({i, agree ? coarsest_step : first_step, prediction});
   }
   for (bool is_first = true; !rest.empty(); is_first = false) {
-    add_rays(rest, is_first, rays);
+    // Every `step`-th sample of each vertex; after the first time, only those that are not known yet. Rays of one
+    // sample follow each other: those of neighbouring vertices cross the same cells of the field.
+    rays.clear();
+    for (std::size_t sample = 0; sample < range_samples; ++sample)
+      for (const auto& [vertex, step, prediction] : rest)
+        if (is_first ? sample % step == 0 : sample % (2 * step) == step && prediction.is_open(sample))
+          rays.push_back({vertex, sample});
     trace_rays(map, vertices, rays);
     const auto is_done = [&](PartlyTraced& each) {
       if (!each.prediction.predict(each.step, tolerance_)) return false;

@@ -117,7 +117,6 @@ class WavelengthTracer {
     double off;  // Distance from its surface at which it is looked for.
   };
 
-  static void add_rays(const std::vector<PartlyTraced>& vertices, bool is_first, std::vector<SampleRay>& rays);
   void trace_rays(FlowMap& map, const std::vector<NewVertex>& vertices, const std::vector<SampleRay>& rays);
   void predict_lengths(FlowMap& map, std::size_t vertex, const Parents& parents) const;
   RayEnd end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const;

@@ -439,21 +439,16 @@ void add_to_films(const Pass& pass, const std::vector<AreaDeposit>& joined, cons
   });
 }
 
-/// The greatest sum of parts that a plane gets: plane_weights are divided by it, so that no sum of integers is too
-/// great.
-double max_sum(const std::vector<AreaDeposit::PlaneWeights>& plane_weights) {
-  AreaDeposit::PlaneWeights sums{};
-  for (const AreaDeposit::PlaneWeights& each : plane_weights)
-    for (std::size_t k = 0; k < planes; ++k) sums[k] += std::abs(each[k]);
-  return *std::max_element(sums.begin(), sums.end());
-}
-
 /// The passes that fill the films. Without irradiance the power of all channels is counted with the colours.
 std::vector<Pass> passes_of(const std::vector<CausticBand>& bands, double gain, Caustic& caustic) {
   const auto channels = caustic.power.size();
   std::vector<Pass> passes;
   const auto add = [&](Pass pass) {
-    const double greatest = max_sum(pass.plane_weights);
+    // Weights are divided by the greatest sum of a plane, so that no sum of integers is too great.
+    AreaDeposit::PlaneWeights sums{};
+    for (const AreaDeposit::PlaneWeights& each : pass.plane_weights)
+      for (std::size_t k = 0; k < planes; ++k) sums[k] += std::abs(each[k]);
+    const double greatest = *std::max_element(sums.begin(), sums.end());
     if (greatest == 0 && pass.first_channel == pass.end_channel) return;
     for (AreaDeposit::PlaneWeights& plane_weights : pass.plane_weights)
       for (double& share : plane_weights) share /= greatest > 0 ? greatest : 1;

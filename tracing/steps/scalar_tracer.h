@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
