@@ -143,9 +143,6 @@ class FlowVertices {
     settings_.job->keep(name_of(settings_.job->part().index), archive.take());
   }
 
-  /// The wavelength samples at which there are lengths.
-  const std::vector<std::size_t>& check_samples() const { return tracer_.check_samples(); }
-
   const FlowMap& map() const { return map_; }  ///< Without triangles and edges.
 
   /// The map, with the numbers of rays.
@@ -377,7 +374,7 @@ class FlowMapBuilder {
     bool is_seen = false;
     float width = std::numeric_limits<float>::infinity(), extent = 0;
     Eigen::Vector2f first(0, 0), last(0, 0);
-    for (const std::size_t sample : vertices_.check_samples()) {
+    for (std::size_t sample = 0; sample < map().wavelengths; sample += map().check_step) {
       const Reach reach = reach_of(quad.corners, sample);
       if (!is_on_plate(reach)) continue;
       if (reach.landed < 4) return true;
@@ -497,7 +494,7 @@ class FlowMapBuilder {
     const auto& [a, b, c, d] = quad.corners;
     const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
     float greatest = 0;
-    for (const std::size_t sample : vertices_.check_samples())
+    for (std::size_t sample = 0; sample < map().wavelengths; sample += map().check_step)
       if (is_on_plate(reach_of(all, sample))) greatest = std::max(greatest, deviation_at(quad, middles, sample));
     return greatest;
   }

@@ -11,9 +11,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double prediction_part = 300;    // Landings are predicted to within the tolerance divided by this.
-constexpr std::size_t first_step = 8;      // 5 samples come first, ...
-constexpr std::size_t coarsest_step = 16;  // ... or 3, where the parents agree in what is between them.
+constexpr double prediction_part = 300;  // Landings are predicted to within the tolerance divided by this.
 constexpr double off_surface = 1e-4;  // Distance, in sizes of a body, at which it is looked for about its own points.
 
 constexpr std::size_t quarters = 4, quarter_samples = (range_samples - 1) / quarters;
@@ -228,18 +226,16 @@ WavelengthTracer::WavelengthTracer(const TensorField& field, const Geometry& geo
     body_.emplace(Body{Geometry(std::move(alone)), off});
   }
   if (!settings.side_light) sides_.emplace(field, beam.direction);
-  const std::size_t step = is_range_ ? first_step : 1;
-  for (std::size_t sample = 0; sample < wavelengths(); sample += step) check_samples_.push_back(sample);
 }
 
 /// Sets the lengths between those of three samples: as far from the mean of two as those of the parents are.
 void WavelengthTracer::predict_lengths(FlowMap& map, std::size_t vertex, const Parents& parents) const {
   const auto missed = [&](std::size_t of, std::size_t check) {
-    const float* lengths = &map.lengths[of * check_samples_.size()];
+    const float* lengths = &map.lengths[of * map.checks()];
     return lengths[check] - (lengths[check - 1] + lengths[check + 1]) / 2;
   };
-  for (std::size_t check = 1; check < check_samples_.size(); check += 2) {
-    float& length = map.lengths[vertex * check_samples_.size() + check];
+  for (std::size_t check = 1; check < map.checks(); check += 2) {
+    float& length = map.lengths[vertex * map.checks() + check];
     length -= missed(vertex, check);
     for (std::size_t i = 0; i < parents.count; ++i)
       length += missed(parents.vertices[i], check) / static_cast<float>(parents.count);
@@ -308,7 +304,7 @@ void WavelengthTracer::trace_rays(FlowMap& map, const std::vector<NewVertex>& ve
     map.landings[at] = plate_.to_pixel(place_on(plate_, geometry_, beam_, batch.position[i])).cast<float>();
     map.ends[at] = end_of(batch, i, of.origin);
     if (sample % map.check_step == 0)
-      map.lengths[of.index * check_samples_.size() + sample / map.check_step] = static_cast<float>(batch.length[i]);
+      map.lengths[of.index * map.checks() + sample / map.check_step] = static_cast<float>(batch.length[i]);
   }
   rays_ += batch.size();
   tensor_samples_ += batch.tensor_samples;

@@ -89,10 +89,8 @@ class WavelengthTracer {
 
   std::size_t wavelengths() const { return flexibilities_.size(); }
 
-  /// The wavelength samples at which there are lengths.
-  const std::vector<std::size_t>& check_samples() const { return check_samples_; }
-
-  std::size_t check_step() const { return check_samples_.size() > 1 ? check_samples_[1] : 1; }
+  /// At every so many wavelength samples there are lengths.
+  std::size_t check_step() const { return is_range_ ? first_step : 1; }
 
   /// Sets landings, ends and lengths of the vertices, for which the map has room. Different vertices may be traced at
   /// once; their parents must be traced already.
@@ -103,6 +101,9 @@ class WavelengthTracer {
   std::uint64_t tensor_samples() const { return tensor_samples_; }
 
  private:
+  static constexpr std::size_t first_step = 8;      // 5 samples come first, ...
+  static constexpr std::size_t coarsest_step = 16;  // ... or 3, where the parents agree in what is between them.
+
   struct SampleRay {
     std::size_t vertex, sample;  // The vertex is a number of a new one.
   };
@@ -133,7 +134,6 @@ class WavelengthTracer {
   float tolerance_;                    // Of predicted landings, pixels.
   bool is_range_;
   std::vector<double> flexibilities_;  // One for each wavelength sample.
-  std::vector<std::size_t> check_samples_;
   std::atomic<std::uint64_t> rays_{0}, ray_steps_{0}, tensor_samples_{0};
 };
 
