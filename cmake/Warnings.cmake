@@ -62,11 +62,14 @@ function(tensorray_relocatable name)
 endfunction()
 
 # Half of the time to compile most files is the headers that nearly all of them include: these are compiled once, for
-# relocatable code.
+# relocatable code. With GCC they bring their level of optimisation to all that uses them, so that `scenes` has its own.
 function(tensorray_common_headers name)
+  set(headers <Eigen/Geometry> <algorithm> <filesystem> <functional> <map> <memory> <optional> <string> <variant>
+              <vector>)
   if(name STREQUAL base)
-    target_precompile_headers(base PRIVATE <Eigen/Geometry> <algorithm> <filesystem> <functional> <map> <memory>
-                              <optional> <string> <variant> <vector>)
+    target_precompile_headers(base PRIVATE ${headers})
+  elseif(name MATCHES "^(scenes|integrators)$")
+    target_precompile_headers(${name} PRIVATE ${headers} <fmt/format.h> <nlohmann/json.hpp>)
   else()
     target_precompile_headers(${name} REUSE_FROM base)
   endif()
@@ -86,13 +89,13 @@ function(tensorray_compile_by_room target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${TENSORRAY_UNITY} UNITY_BUILD_MODE GROUP)
 endfunction()
 
-# tensorray_library(NAME [EXCEPT FOLDERS]): a static library of all sources in this folder and its subfolders, without
-# those of subfolders that match an expression (CONFIGURE_DEPENDS finds new files by itself).
+# tensorray_library(NAME [EXCEPT PATHS]): a static library of all sources in this folder and its subfolders, without
+# those whose paths match an expression (CONFIGURE_DEPENDS finds new files by itself).
 function(tensorray_library name)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" EXCEPT "")
   file(GLOB sources CONFIGURE_DEPENDS *.cpp */*.cpp)
   if(ARG_EXCEPT)
-    list(FILTER sources EXCLUDE REGEX "/${ARG_EXCEPT}/")
+    list(FILTER sources EXCLUDE REGEX "${ARG_EXCEPT}")
   endif()
   add_library(${name} STATIC ${sources})
   tensorray_compile_by_room(${name})

@@ -11,9 +11,8 @@
 
 #include "base/process/job.h"
 #include "base/process/seconds.h"
-#include "integrators/lens/lens_places.h"
-#include "integrators/lens/lens_shading.h"
 #include "integrators/lens/lens_view.h"
+#include "renderer/coverage/planar_mesh.h"
 #include "tracing/flow_drawing/flow_view.h"
 
 namespace tensorray {
@@ -26,8 +25,8 @@ using Eigen::Vector2d;
 constexpr double tolerance = 0.5;             // Wanted error of landings, pixels.
 constexpr double finest_of_scatter = 0.25;    // Size of the smallest quads, pixels: gaps at tears are as wide.
 constexpr double finest_of_gather = 1;        // There, samples in torn quads are traced on their own.
-constexpr std::size_t max_starts = 1u << 14;  // The map has at most so many vertices,
-constexpr std::size_t starts_per_pixel = 2;   // plus so many for each pixel. A chaotic field could need any number.
+constexpr double same_place = 1e-3;           // Pixels: sheets whose starts are nearer than this count as one.
+constexpr std::size_t max_starts = 1u << 14;  // The map has at most so many vertices, plus `starts_per_pixel`.
 
 /// Maps pixels of the receiver along the light to coordinates in the image's plane.
 Affine2d straight_map(const Plate& receiver, const Plate& image, const Eigen::Vector3d& direction) {
@@ -160,14 +159,43 @@ void copy_tile(const LensView& view, int tile, LensPicture& picture, Archive& ar
   }
 }
 
+/// The landings at the reference.
+PlanarMesh reference_mesh(const LensLight& light) {
+  PlanarMesh mesh;
+  std::vector<bool> landed;
+  for (std::size_t i = 0; i < light.map.starts.size(); ++i) {
+    const FlowLanding landing = landing_at(light.map, i, sample_place(light, light.settings.reference));
+    mesh.vertices.push_back(landing.at);
+    landed.push_back(landing.end == RayEnd::plate);
+  }
+  for (const FlowTriangle& triangle : light.map.triangles) {
+    const auto& [a, b, c] = triangle.corners;
+    if (!triangle.is_torn && landed[a] && landed[b] && landed[c]) mesh.triangles.push_back(triangle.corners);
+  }
+  return mesh;
+}
+
+/// Counts the places of the picture that show what each pixel sees, in `gather`: the map from the picture to the image
+/// may fold, and each sheet is one place.
 void count_places(const LensView& view, LensPicture& picture) {
-  const PlaceCounter counter(view.light);
-  const Plate& plane = view.light.setup.image.plane;
+  const LensSetup& setup = view.light.setup;
+  const PlanarMesh mesh = reference_mesh(view.light);
+  const PlanarMeshSearch search(mesh);
+  const double least = same_place * setup.receiver.pixel_size().minCoeff();
   tbb::parallel_for(std::size_t{0}, picture.points.size(), [&](std::size_t i) {
     LensPoint& point = picture.points[i];
     if (point.end != LensEnd::image && point.end != LensEnd::outside) return;
-    const Vector2d at = ((point.st.array() - 0.5) * plane.size.array()).matrix();
-    point.folds = counter.count(view.landings * at);
+    thread_local std::vector<PlanarHit> hits;
+    thread_local std::vector<Vector2d> places;
+    search.find(view.landings * ((point.st.array() - 0.5) * setup.image.plane.size.array()).matrix(), hits);
+    places.clear();
+    for (const PlanarHit& hit : hits) {
+      Vector2d start(0, 0);
+      for (int k = 0; k < 3; ++k) start += hit.weights[k] * view.light.map.starts[mesh.triangles[hit.triangle][k]];
+      if (std::none_of(places.begin(), places.end(), [&](const Vector2d& s) { return (s - start).norm() < least; }))
+        places.push_back(start);
+    }
+    point.folds = std::max(1, static_cast<int>(places.size()));  // At least the pixel itself.
   });
 }
 

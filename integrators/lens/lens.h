@@ -58,6 +58,9 @@ struct LensBand {
 using LensRadiance =
     std::function<void(const Eigen::Vector3d& rgb, std::size_t first, std::size_t last, double* radiances)>;
 
+/// The flow map has at most about so many vertices for each pixel. (A chaotic field could need any number.)
+constexpr std::size_t starts_per_pixel = 2;
+
 struct LensLight;
 
 struct LensSettings {

@@ -69,37 +69,19 @@ double bounded(double logarithm) { return std::clamp(logarithm, -100.0, 100.0); 
 
 ChannelTable<LensPixel> lens_channels() {
   using Pixel = const LensPixel&;
-  return {{{"R", "G", "B"},
-           "The picture, scene-linear: 1 is the white of the image. Multiplied by A.",
-           [](Pixel pixel) { return pixel.color; }},
-          {{"A"},
-           "The part of the pixel that sees the image, of the band that sees the largest part: it is 0 only where no "
-           "band sees any, and colours are dark where bands are missing.",
-           [](Pixel pixel) { return std::min(pixel.alpha, 1.0); }},  // Rounding may make the sum greater than 1.
-          {{"texture.s", "texture.t"},
-           "The place in the image: (0, 0) is the lower left, (1, 1) the upper right corner, as in ST maps.",
-           [](Pixel pixel) { return pixel.point.st; }},
-          {{"displacement.x", "displacement.y", "displacement.z"},
-           "From the point that straight light would show to the point that is seen; world units.",
-           [](Pixel pixel) { return pixel.point.displacement; }},
-          {{"magnification.log"},
-           "ln of the area that a part of the image has in the picture, divided by its own area: positive where the "
-           "part is enlarged.",
-           [](Pixel pixel) { return bounded(pixel.point.log_magnification); }},
-          {{"magnification.major", "magnification.minor"},
-           "The same along the two principal directions: ln σ₁ ≥ ln σ₂ of the Jacobian. From −100 to 100.",
-           [](Pixel pixel) -> Eigen::Vector2d {
-             return {bounded(pixel.point.log_stretch[0]), bounded(pixel.point.log_stretch[1])};
-           }},
-          {{"folds"},
-           "`scatter`: the number of sheets of the image at this pixel. `gather`: the number of places in the picture "
-           "that show what is seen here. 1: no fold.",
-           [](Pixel pixel) { return pixel.point.folds; }},
-          {{"length"}, "The length of the ray, world units.", [](Pixel pixel) { return pixel.point.length; }},
-          {{"end"},
-           "`gather`: 0 sees the image, 1 missed it, 2 met an obstacle (or turned back), 3 step limit, 4 degenerate, 5 "
-           "beside the image. `scatter`: 0 sees the image, 1 no light lands here.",
-           [](Pixel pixel) { return static_cast<int>(pixel.point.end); }}};
+  return {
+      {{"R", "G", "B"}, [](Pixel pixel) { return pixel.color; }},
+      {{"A"}, [](Pixel pixel) { return std::min(pixel.alpha, 1.0); }},  // Rounding may make the sum greater than 1.
+      {{"texture.s", "texture.t"}, [](Pixel pixel) { return pixel.point.st; }},
+      {{"displacement.x", "displacement.y", "displacement.z"}, [](Pixel pixel) { return pixel.point.displacement; }},
+      {{"magnification.log"}, [](Pixel pixel) { return bounded(pixel.point.log_magnification); }},
+      {{"magnification.major", "magnification.minor"},
+       [](Pixel pixel) -> Eigen::Vector2d {
+         return {bounded(pixel.point.log_stretch[0]), bounded(pixel.point.log_stretch[1])};
+       }},
+      {{"folds"}, [](Pixel pixel) { return pixel.point.folds; }},
+      {{"length"}, [](Pixel pixel) { return pixel.point.length; }},
+      {{"end"}, [](Pixel pixel) { return static_cast<int>(pixel.point.end); }}};
 }
 
 Image make_image(const LensPicture& picture) {
@@ -217,8 +199,7 @@ void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const P
   const Plate& plane = light.setup.image.plane;
   all.pictures.push_back(make_image(picture));
   if (settings_.obstacles == ObstacleLook::shaded)
-    LensObstacles(scene.geometry.surfaces(), lens_.receiver, scene.beam.direction)
-        .draw(plane, settings_.samples, all.pictures.back());
+    draw_obstacles(scene.geometry.surfaces(), light.setup, settings_.samples, all.pictures.back());
   if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, all.pictures.back());
   add_statistics(picture, all.statistics);
   all.statistics.seconds_tracing += light.seconds_tracing;
@@ -236,7 +217,7 @@ Render LoadedLens::render_of(const Scene& scene, LensPictures all) const {
   for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)])
     result.statistics.positions += count;
   result.metadata["tensorray:end"] = end_codes();
-  result.view = view_of(lens_.receiver);
+  result.view = picture_view(lens_.receiver);
   result.exposure = 0;  // Shows the colours of the image unchanged.
   if (nothing_arrived(result.statistics))
     result.warnings.push_back("no ray met the image; check `receiver` and `integrator.image_plane`");
@@ -249,9 +230,9 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
   const bool is_shard = job && job->is_shard;
   Ranks* const ranks = job ? job->ranks : nullptr;
   LensPictures all;
-  if (job && job->show && is_root(ranks))
+  if (job)
     settings.show = [&](const std::function<const LensLight&()>& so_far) {
-      if (!job->picture_wanted.exchange(false)) return;
+      if (!job->takes_picture_request()) return;
       LensPictures shown = all;
       add_picture(scene, so_far(), progress, shown);
       job->show(render_of(scene, std::move(shown)));
@@ -274,13 +255,7 @@ class LensMethod : public MethodWith<LensDescription> {
   const char* name() const override { return "lens"; }
   bool shows_plate() const override { return true; }
 
-  std::vector<Output> outputs() const override {
-    std::vector<Output> outputs = picture_outputs();
-    outputs.push_back(spectral_output());
-    return outputs;
-  }
-
-  std::vector<ChannelText> channels() const override { return channel_texts(lens_channels()); }
+  std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
 
   std::vector<NamedFile> inputs() const override {
     const auto* file = std::get_if<std::filesystem::path>(&settings().image);
@@ -292,11 +267,18 @@ class LensMethod : public MethodWith<LensDescription> {
     if (!chosen) return;
     check_spectral_output(scene, source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
-    // The flow map, and the points of a picture with its colours; the channels of each depth, and of all side by side.
+    // While a depth is drawn: its points, films of colours and alpha, the picture and its colours, and the flow map; of
+    // the other depths, and of all side by side, the pictures.
     const auto& depth = settings().plane.depth;
-    const double more_pictures = depth && !depth->empty() ? static_cast<double>(depth->size() - 1) : 0;
-    const double spectral = scene.output.wants("spectral") ? 16.0 * channel_count(scene) : 0;
-    check_receiver_memory(scene, 280 + spectral + more_pictures * (120 + spectral / 2), source);
+    const double more = depth && !depth->empty() ? static_cast<double>(depth->size() - 1) : 0;
+    const double picture = static_cast<double>(channel_names(lens_channels()).size()) * sizeof(float);
+    const double spectral = scene.output.wants("spectral") ? channel_count(scene) : 0;
+    const double map = starts_per_pixel * 3 * sizeof(double);
+    check_receiver_memory(scene,
+                          sizeof(LensPoint) + 4 * sizeof(double) + picture + 7 * sizeof(float) + map +
+                              spectral * (sizeof(double) + 2 * sizeof(float)) +
+                              more * 2 * (picture + spectral * sizeof(float)),
+                          source);
   }
 
   std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {

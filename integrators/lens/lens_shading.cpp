@@ -1,4 +1,4 @@
-#include "integrators/lens/lens_shading.h"
+#include "integrators/lens/lens_view.h"
 
 #include <algorithm>
 #include <cmath>

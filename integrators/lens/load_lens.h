@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "integrators/lens/lens_description.h"
+#include "integrators/lens/lens_method.h"
 #include "renderer/surfaces/plate.h"
 #include "renderer/textures/texture.h"
 #include "scenes/scene/scene.h"

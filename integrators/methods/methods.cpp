@@ -1,9 +1,8 @@
-#include "integrators/methods/methods.h"
-
 #include <algorithm>
 #include <cstring>
 
 #include "integrators/lens/lens_method.h"
+#include "integrators/methods/read_scene.h"
 #include "integrators/path_tracing/path_tracing_method.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
 #include "integrators/scene/scene_method.h"

@@ -7,12 +7,11 @@
 
 #include "base/text/path_text.h"
 #include "base/text/text.h"
-#include "integrators/methods/methods.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/description/scene_keys.h"
-#include "scenes/source/caption.h"
+#include "scenes/keys/schema_writer.h"
+#include "scenes/keys/section_reader.h"
 #include "scenes/source/frames.h"
-#include "scenes/source/keyframe_schema.h"
 #include "scenes/source/overrides.h"
 
 namespace tensorray {

@@ -11,6 +11,9 @@
 
 namespace tensorray {
 
+/// A description with the defaults of all methods, which methods.cpp lists. A scene file is then read into it.
+SceneDescription default_scene();
+
 /// Changes to a scene file from the command line.
 struct SceneChanges {
   /// "KEY=VALUE". KEY is a list of keys with dots between them ("light.photons", "obstacles.0.file"). VALUE is JSON; if

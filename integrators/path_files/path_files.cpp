@@ -7,7 +7,6 @@
 #include "base/errors.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"
-#include "integrators/path_files/path_formats.h"
 
 namespace tensorray {
 namespace {

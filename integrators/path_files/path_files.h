@@ -44,4 +44,14 @@ std::vector<Path> read_paths(const std::filesystem::path& path);
 /// fewer than two points are left.
 PathPoints bare_way(const std::vector<Eigen::Vector3d>& positions);
 
+// One format each:
+
+/// Write the file. @throw std::runtime_error naming the file and the reason.
+void write_vtp_paths(const std::filesystem::path& path, const std::vector<Path>& paths);
+void write_tck_paths(const std::filesystem::path& path, const std::vector<Path>& paths);
+
+/// Read the file. @throw std::runtime_error with the reason (without the file's name).
+std::vector<Path> read_vtp_paths(const std::filesystem::path& path);
+std::vector<Path> read_tck_paths(const std::filesystem::path& path);
+
 }  // namespace tensorray

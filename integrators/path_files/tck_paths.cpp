@@ -20,7 +20,6 @@
 #include "base/text/byte_order.h"
 #include "base/text/text.h"
 #include "integrators/path_files/path_files.h"
-#include "integrators/path_files/path_formats.h"
 
 namespace tensorray {
 namespace {

@@ -8,7 +8,6 @@
 #include <tbb/parallel_for.h>
 
 #include "integrators/path_files/path_files.h"
-#include "integrators/path_files/path_formats.h"
 #include "tracing/paths/cross_section.h"
 #include "volumes/points/vtk_files.h"
 

@@ -7,7 +7,7 @@
 
 #include "base/constants.h"
 #include "base/process/job.h"
-#include "integrators/path_tracing/path_tracing_keys.h"
+#include "integrators/path_tracing/path_tracing_method.h"
 #include "integrators/photon_distribution/plate_light.h"
 #include "renderer/charts/colormap.h"
 #include "renderer/color/color.h"
@@ -76,7 +76,7 @@ Image plate_image(const Scene& scene, Job* job, const Progress& progress) {
   const auto make = [&] {
     Job whole;  // All shards make all of it.
     whole.ranks = job ? job->ranks : nullptr;
-    Image made = light_on_plate(scene, progress, whole.ranks ? &whole : nullptr).linear;
+    Image made = light_on_plate(scene, progress, whole.ranks ? &whole : nullptr).render.linear;
     if (is_root(whole.ranks)) image = std::move(made);
     broadcast_list(whole.ranks, image.pixels);
   };
@@ -163,19 +163,6 @@ ShadedSurface make_slice(const Scene& scene, const ShownLight& light, const Slic
   return surface;
 }
 
-}  // namespace
-
-ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle) {
-  if (smooth_angle) *smooth_angle *= pi / 180;
-  MeshWithNormals read = read_mesh_with_normals(file, smooth_angle);
-  ShadedSurface surface;
-  surface.shape = std::move(read.mesh);
-  surface.normals = std::move(read.normals);
-  return surface;
-}
-
-namespace {
-
 ShadedSurface make_isosurface(const Scene& scene, const IsosurfaceDescription& description) {
   Isosurface found = isosurface(scene.field, description.invariant, description.value);
   if (found.mesh.triangles.empty())
@@ -212,6 +199,15 @@ MaterialSettings settings_of(const MaterialDescription& description, const std::
 }
 
 }  // namespace
+
+ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle) {
+  if (smooth_angle) *smooth_angle *= pi / 180;
+  MeshWithNormals read = read_mesh_with_normals(file, smooth_angle);
+  ShadedSurface surface;
+  surface.shape = std::move(read.mesh);
+  surface.normals = std::move(read.normals);
+  return surface;
+}
 
 Material load_material(const MaterialDescription& description, const ShownLight& light) {
   // For metals and glass the colour is a factor: it is 1 unless the scene gives a colour that is not the default.

@@ -8,9 +8,7 @@
 
 #include "base/constants.h"
 #include "integrators/path_files/path_files.h"
-#include "integrators/seeds/seed_files.h"
 #include "integrators/seeds/seeds.h"
-#include "integrators/seeds/threshold_seeds.h"
 #include "renderer/images/image.h"
 #include "volumes/tensors/invariants.h"
 
@@ -41,15 +39,10 @@ std::vector<Eigen::Vector3d> line_positions(const SeedDescription& seeds, const 
 std::vector<Eigen::Vector3d> threshold_positions(const SeedDescription& seeds, const TensorField& field,
                                                  std::uint64_t seed) {
   if (!seeds.above && !seeds.below) throw std::invalid_argument("the kind \"threshold\" needs `above` or `below`");
-  Threshold threshold;
-  threshold.value = [which = seeds.invariant](const Eigen::Matrix3d& tensor) { return invariant(which, tensor); };
-  if (seeds.above) threshold.least = *seeds.above;
-  if (seeds.below) threshold.greatest = *seeds.below;
-  try {
-    return threshold_seeds(field, field.world_box(), threshold, seeds.count, seed);
-  } catch (const std::runtime_error& error) {
-    throw std::invalid_argument(error.what());
-  }
+  Threshold threshold{seeds.invariant};
+  if (seeds.above) threshold.min = *seeds.above;
+  if (seeds.below) threshold.max = *seeds.below;
+  return threshold_seeds(field, threshold, seeds.count, seed);
 }
 
 SeedList seed_list(const Scene& scene, const SeedDescription& seeds) {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/process/progress.h"
-#include "integrators/path_tracing/path_tracing_description.h"
+#include "integrators/path_tracing/path_tracing_method.h"
 #include "renderer/lights/lights.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/scene/render.h"

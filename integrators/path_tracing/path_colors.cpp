@@ -5,9 +5,9 @@
 
 #include <tbb/parallel_for.h>
 
-#include "integrators/path_tracing/path_tracing_keys.h"
+#include "integrators/path_tracing/path_tracing_method.h"
 #include "renderer/charts/color_bar.h"
-#include "scenes/outputs/wavelength_color.h"
+#include "scenes/outputs/annotations.h"
 #include "volumes/tensors/invariants.h"
 
 namespace tensorray {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "integrators/path_tracing/path_tracing_description.h"
+#include "integrators/path_tracing/path_tracing_method.h"
 #include "renderer/charts/colormap.h"
 #include "renderer/images/image.h"
 #include "tracing/paths/paths.h"

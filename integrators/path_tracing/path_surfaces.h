@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "integrators/path_tracing/path_colors.h"
-#include "integrators/path_tracing/path_tracing_description.h"
+#include "integrators/path_tracing/path_tracing_method.h"
 #include "renderer/surfaces/surface.h"
 #include "renderer/surfaces/tube_mesh.h"
 #include "tracing/paths/paths.h"

@@ -10,9 +10,7 @@
 #include "integrators/path_tracing/context_surfaces.h"
 #include "integrators/path_tracing/path_colors.h"
 #include "integrators/path_tracing/path_surfaces.h"
-#include "integrators/path_tracing/path_tracing_keys.h"
 #include "integrators/path_tracing/stage.h"
-#include "integrators/path_tracing/studio.h"
 #include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/annotations.h"
@@ -79,15 +77,6 @@ PathShapes make_shapes(const Scene& scene, const PathScene& path_scene, const st
   return shapes;
 }
 
-Camera scene_camera(const Scene& scene, const ContextDescription& context, const std::vector<Path>& paths,
-                    double free) {
-  try {
-    return make_camera(scene.description.camera, points_of_interest(scene, context, paths), free);
-  } catch (const std::invalid_argument& error) {
-    throw SceneError(fmt::format("{}: `/camera`: {}", scene.description.path.string(), error.what()));
-  }
-}
-
 /// Refuses a scene that is so large that the renderer would lose the paths, because its precision is relative to the
 /// size of the whole scene.
 void require_fine(const Scene& scene, const RadiusDescription& radius, const SurfaceScene& stage,
@@ -134,7 +123,7 @@ SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<P
   const LightSampler sampler(lights, light.luminances(), stage.bounds());
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
   ShadedScene shaded{stage, materials, sampler, table};
-  set_groups(light_groups(scene.description), shaded);
+  set_groups(scene.description, shaded);
   return render_surfaces(shaded, camera, tracer_settings(scene.description, paths_.settings), run.callbacks);
 }
 
@@ -161,10 +150,11 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
                   typical_radius(description.radius, result.paths.size(), scene.field.world_box()));
   // As an annotation, the legend covers a part of the picture: it has no effect on other files.
   const bool has_room = description.color.legend && colors.legend;
-  const Camera camera = scene_camera(scene, description.context, result.paths, has_room ? legend_width : 0);
+  const Camera camera = make_camera(scene.description, points_of_interest(scene, description.context, result.paths),
+                                    has_room ? legend_width : 0);
   PathShapes shapes = make_shapes(scene, paths_, result.paths, colors, camera);
   result.exposure = 0;
-  if (has_picture) result.view = view_of(camera);
+  if (has_picture) result.view = picture_view(camera);
   if (colors.legend && (description.color.legend || output.wants(Annotation::legend)))
     result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double) {
       legend(image, matrix);
@@ -176,18 +166,10 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     };
   if (!has_picture) return result;
 
-  const LightGroups groups = light_groups(scene.description);
   const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
-    render.linear = make_image(picture, light, description, groups);
-    if (output.wants("spectral"))
-      render.spectral =
-          spectral_image(picture.radiance, light.bands, SpectralQuantity::radiance, 1, light.xyz_to_working);
+    set_picture(picture, light, description, scene.description, render);
   };
-  const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {
-    Render shown = result;
-    add_picture(picture, shown);
-    return shown;
-  });
+  const RenderCallbacks callbacks = render_callbacks(progress, job, result, add_picture);
   const StageRun run{job, progress, callbacks};
   add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, run), result);
   result.statistics.seconds_drawing = seconds_since(drawing);
@@ -224,14 +206,11 @@ class PathTracingMethod : public MethodWith<PathTracingDescription> {
   bool is_sampled() const override { return true; }
 
   std::vector<Output> outputs() const override {
-    std::vector<Output> outputs = picture_outputs();
-    outputs.push_back(spectral_output());
-    outputs.push_back({"paths", "the bent rays, with all quantities along them", {".vtp", ".tck"}, write_path_file});
-    outputs.push_back({"tubes", "the bent rays as a mesh", {".ply", ".obj"}, write_tube_file});
-    return outputs;
+    return picture_outputs(
+        {spectral_output(),
+         {"paths", "the bent rays, with all quantities along them", {".vtp", ".tck"}, write_path_file},
+         {"tubes", "the bent rays as a mesh", {".ply", ".obj"}, write_tube_file}});
   }
-
-  std::vector<ChannelText> channels() const override { return surface_channel_texts(false); }
 
   std::vector<NamedFile> inputs() const override {
     return {{settings().paths, "`/integrator/paths`"}, {settings().seeds.file, "`/integrator/seeds/file`"}};

@@ -34,75 +34,54 @@ Eigen::Vector3f layer_color(const Film& film, std::size_t layer, std::size_t ind
   return color;
 }
 
-/// The picture, and what denoisers and compositors use of the first surface.
-ChannelTable<SurfacePixel> first_surface_channels() {
-  using Pixel = const SurfacePixel&;
-  return {
-      {{"R", "G", "B"},
-       "The picture, scene-linear: 1 is white. If `background` is `transparent`, multiplied by A.",
-       [](Pixel pixel) { return pixel.color; }},
-      {{"A"},
-       "The part of the pixel that shows something; 1 unless `background` is `transparent`.",
-       [](Pixel pixel) { return pixel.alpha; }},
-      {{"Z"},
-       "Distance along the view, world units; 1e10 where nothing is seen.",
-       [](Pixel pixel) { return pixel.picture.alpha(pixel.index) > 0 ? pixel.state.depth.value[0] : nothing_depth; }},
-      {{"normal.X", "normal.Y", "normal.Z"}, "In world space, towards the viewer.", mean(&PixelState::normal)},
-      {{"albedo.R", "albedo.G", "albedo.B"}, "The surface's own colour, without light.", mean(&PixelState::albedo)},
-      {{"path"},
-       "The number of the path nearest to the pixel's centre; −1: none. Paths that meet the volume are numbered from 0 "
-       "in the order of their seeds.",
-       [](Pixel pixel) { return pixel.state.path; }},
-      {{"force"}, "‖T V‖ of the path, in the unit of T.", mean(&PixelState::force)},
-      {{"length"}, "The length from the beginning of the path, world units.", mean(&PixelState::arc_length)},
-      {{"samples"}, "The number of samples that the pixel has taken.", [](Pixel pixel) { return pixel.state.samples; }},
-      {{"variance"}, "Of the pixel's luminance: the square of its standard error.", [](Pixel pixel) {
-         return pixel.state.variance();
-       }}};
-}
-
-/// @param bends, has_landed  Whether the camera's light bends, and whether light was traced to surfaces beforehand.
-ChannelTable<SurfacePixel> bent_light_channels(bool bends, bool has_landed) {
-  using Pixel = const SurfacePixel&;
-  return {
-      {{"gain"},
-       "The mean factor on radiance; 1 where the camera's light is straight.",
-       mean(&PixelState::radiance_scale),
-       bends},
-      {{"deflection"},
-       "The mean angle by which the camera's light is turned, radians.",
-       mean(&PixelState::deflection),
-       bends},
-      {{"arrives"}, "The part of the bent rays that could be traced to their ends.", mean(&PixelState::arrives), bends},
-      {{"folds"},
-       "The number of sheets of a light that lie on each other where it has landed.",
-       mean(&PixelState::folds),
-       bends},
-      {{"texture.s", "texture.t"},
-       "The place in a plate's texture: (0, 0) is its lower left, (1, 1) its upper right corner.",
-       mean(&PixelState::texture),
-       bends},
-      {{"caustic.R", "caustic.G", "caustic.B"},
-       "If the field throws light on objects: all light that they have received from directional lights and points "
-       "through the volume.",
-       [](Pixel pixel) { return layer_color(pixel.picture.landed, 0, pixel.index); },
-       has_landed},
-      {{"straight.R", "straight.G", "straight.B"},
-       "The picture without `caustic`.",
-       [](Pixel pixel) -> Eigen::Vector3f {
-         return pixel.radiance - layer_color(pixel.picture.landed, 0, pixel.index);
-       },
-       has_landed}};
-}
-
 ChannelTable<SurfacePixel> surface_channels(const SurfacePicture& picture, const std::vector<std::string>& groups) {
-  ChannelTable<SurfacePixel> table = first_surface_channels();
-  for (auto& row : bent_light_channels(picture.bends, !picture.landed.values.empty())) table.push_back(std::move(row));
+  using Pixel = const SurfacePixel&;
+  // The picture, and what denoisers and compositors use of the first surface.
+  ChannelTable<SurfacePixel> table{
+      {{"R", "G", "B"}, [](Pixel pixel) { return pixel.color; }},
+      {{"A"}, [](Pixel pixel) { return pixel.alpha; }},
+      {{"Z"},
+       [](Pixel pixel) { return pixel.picture.alpha(pixel.index) > 0 ? pixel.state.depth.value[0] : nothing_depth; }},
+      {{"normal.X", "normal.Y", "normal.Z"}, mean(&PixelState::normal)},
+      {{"albedo.R", "albedo.G", "albedo.B"}, mean(&PixelState::albedo)},
+      {{"path"}, [](Pixel pixel) { return pixel.state.path; }},
+      {{"force"}, mean(&PixelState::force)},
+      {{"length"}, mean(&PixelState::arc_length)},
+      {{"samples"}, [](Pixel pixel) { return pixel.state.samples; }},
+      {{"variance"}, [](Pixel pixel) { return pixel.state.variance(); }}};
+  if (picture.bends) {  // The camera's light.
+    table.push_back({{"gain"}, mean(&PixelState::radiance_scale)});
+    table.push_back({{"deflection"}, mean(&PixelState::deflection)});
+    table.push_back({{"arrives"}, mean(&PixelState::arrives)});
+    table.push_back({{"folds"}, mean(&PixelState::folds)});
+    table.push_back({{"texture.s", "texture.t"}, mean(&PixelState::texture)});
+  }
+  if (!picture.landed.values.empty()) {  // Light was traced to surfaces beforehand.
+    const auto landed = [](Pixel pixel) { return layer_color(pixel.picture.landed, 0, pixel.index); };
+    table.push_back({{"caustic.R", "caustic.G", "caustic.B"}, landed});
+    table.push_back({{"straight.R", "straight.G", "straight.B"},
+                     [landed](Pixel pixel) -> Eigen::Vector3f { return pixel.radiance - landed(pixel); }});
+  }
   for (std::size_t i = 0; i < groups.size(); ++i)
     table.push_back({{groups[i] + ".R", groups[i] + ".G", groups[i] + ".B"},
-                     "The part of the picture that the `lights` of a `group` of this name light.",
-                     [i](const SurfacePixel& pixel) { return layer_color(pixel.picture.groups, i, pixel.index); }});
+                     [i](Pixel pixel) { return layer_color(pixel.picture.groups, i, pixel.index); }});
   return table;
+}
+
+/// The groups of the scene's lights.
+struct LightGroups {
+  std::vector<std::string> names;
+  std::vector<int> of_light;  // Index of each light's group, or −1.
+};
+
+LightGroups light_groups(const SceneDescription& scene) {
+  LightGroups groups;
+  for (const LightSourceDescription& light : scene.lights) {
+    const auto found = std::find(groups.names.begin(), groups.names.end(), light.group);
+    groups.of_light.push_back(light.group.empty() ? -1 : static_cast<int>(found - groups.names.begin()));
+    if (!light.group.empty() && found == groups.names.end()) groups.names.push_back(light.group);
+  }
+  return groups;
 }
 
 }  // namespace
@@ -125,32 +104,16 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
   return settings;
 }
 
-LightGroups light_groups(const SceneDescription& scene) {
-  LightGroups groups;
-  for (const LightSourceDescription& light : scene.lights) {
-    const auto found = std::find(groups.names.begin(), groups.names.end(), light.group);
-    groups.of_light.push_back(light.group.empty() ? -1 : static_cast<int>(found - groups.names.begin()));
-    if (!light.group.empty() && found == groups.names.end()) groups.names.push_back(light.group);
-  }
-  return groups;
+void set_groups(const SceneDescription& scene, ShadedScene& shaded) {
+  LightGroups groups = light_groups(scene);
+  shaded.groups = static_cast<int>(groups.names.size());
+  if (shaded.groups > 0) shaded.group_of_light = std::move(groups.of_light);
 }
 
-void set_groups(const LightGroups& groups, ShadedScene& scene) {
-  scene.groups = static_cast<int>(groups.names.size());
-  if (scene.groups > 0) scene.group_of_light = groups.of_light;
-}
-
-std::vector<ChannelText> surface_channel_texts(bool bent) {
-  std::vector<ChannelText> texts;
-  for (const ChannelRow<SurfacePixel>& row : surface_channels({}, {"GROUP"}))
-    if (row.is_there != bent) texts.push_back(row);
-  return texts;
-}
-
-Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
-                 const LightGroups& groups) {
+void set_picture(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
+                 const SceneDescription& scene, Render& render) {
   const Image colors = linear_image(picture.radiance, light.bands, light.xyz_to_working);
-  const ChannelTable<SurfacePixel> table = surface_channels(picture, groups.names);
+  const ChannelTable<SurfacePixel> table = surface_channels(picture, light_groups(scene).names);
   Image image(colors.width, colors.height, channel_names(table));
   const bool is_colored = description.background == Background::color;
   Eigen::Vector3f background = Eigen::Vector3f::Zero();
@@ -162,11 +125,14 @@ Image make_image(const SurfacePicture& picture, const ShownLight& light, const P
         picture, picture.pixels[i], i, radiance, radiance + (1 - alpha) * background, is_colored ? 1 : alpha};
     write_channels(table, pixel, &image.pixels[i * image.channels.size()]);
   }
-  return image;
+  render.linear = std::move(image);
+  if (scene.output.wants("spectral"))
+    render.spectral =
+        spectral_image(picture.radiance, light.bands, SpectralQuantity::radiance, 1, light.xyz_to_working);
 }
 
-RenderCallbacks callbacks_of(const Progress& progress, RenderJob* job,
-                             const std::function<Render(const SurfacePicture&)>& finish) {
+RenderCallbacks render_callbacks(const Progress& progress, RenderJob* job, const Render& so_far,
+                                 const std::function<void(const SurfacePicture&, Render&)>& add_picture) {
   RenderCallbacks callbacks;
   callbacks.progress = [&progress, job](std::uint64_t done, std::uint64_t total) {
     if (job) job->fraction = static_cast<double>(done) / static_cast<double>(total);
@@ -177,7 +143,12 @@ RenderCallbacks callbacks_of(const Progress& progress, RenderJob* job,
   };
   if (!job) return callbacks;
   callbacks.job = job;
-  if (job->show) callbacks.show = [job, finish](const SurfacePicture& picture) { job->show(finish(picture)); };
+  if (job->show)
+    callbacks.show = [job, &so_far, add_picture](const SurfacePicture& picture) {
+      Render shown = so_far;
+      add_picture(picture, shown);
+      job->show(std::move(shown));
+    };
   return callbacks;
 }
 

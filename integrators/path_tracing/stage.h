@@ -1,14 +1,18 @@
 #pragma once
 /// @file integrators/path_tracing/stage.h
-/// What all pictures of surfaces share: the settings of the path tracer, visible lamps, and the channels of the
-/// picture.
+/// What all pictures of surfaces share: camera and lights (studio.cpp), the settings of the path tracer, visible lamps,
+/// and the channels of the picture.
 
 #include <functional>
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "base/process/progress.h"
 #include "integrators/path_tracing/load_paths.h"
+#include "integrators/path_tracing/path_tracing_method.h"
+#include "renderer/camera/camera.h"
 #include "renderer/camera/path_tracer.h"
 #include "renderer/images/image.h"
 #include "renderer/lights/lights.h"
@@ -20,28 +24,27 @@
 
 namespace tensorray {
 
+/// The camera of the scene; if it has no position, a camera that shows all of `points`.
+/// @param free  Part of the picture's width that such a camera leaves free at the right.
+/// @throw SceneError naming the values that do not fit together.
+Camera make_camera(const SceneDescription& scene, const std::vector<Eigen::Vector3d>& points, double free);
+
+/// The lights of the scene; if it has none, a white sky and a lamp at the viewer's upper left.
+std::vector<Light> make_lights(const SceneDescription& description, const ShownLights& shown, const Camera& camera);
+
 PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTracingDescription& description);
 
-/// The groups of the scene's lights.
-struct LightGroups {
-  std::vector<std::string> names;
-  std::vector<int> of_light;  ///< Index of each light's group, or −1.
-};
+/// Sets the groups of the scene's lights.
+void set_groups(const SceneDescription& scene, ShadedScene& shaded);
 
-LightGroups light_groups(const SceneDescription& scene);
+/// Sets the picture, with all channels that it has, and the spectral one if the scene asks for it.
+void set_picture(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
+                 const SceneDescription& scene, Render& render);
 
-void set_groups(const LightGroups& groups, ShadedScene& scene);
-
-/// What the channels of the picture are. @param bent  Those that it has only if light bends; otherwise the others.
-std::vector<ChannelText> surface_channel_texts(bool bent);
-
-/// The picture with all channels that it has.
-Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
-                 const LightGroups& groups);
-
-/// @param finish  Completes a render, which is then shown, by the picture so far.
-RenderCallbacks callbacks_of(const Progress& progress, RenderJob* job,
-                             const std::function<Render(const SurfacePicture&)>& finish);
+/// @param so_far  What there is without a picture; must outlive the result. @param add_picture  Adds one, which is
+/// shown.
+RenderCallbacks render_callbacks(const Progress& progress, RenderJob* job, const Render& so_far,
+                                 const std::function<void(const SurfacePicture&, Render&)>& add_picture);
 
 /// Adds the area lights as surfaces, so that they are visible.
 void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,

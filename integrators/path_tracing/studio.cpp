@@ -1,8 +1,9 @@
-#include "integrators/path_tracing/studio.h"
-
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "base/constants.h"
+#include "integrators/path_tracing/stage.h"
 #include "renderer/surfaces/plate.h"
 
 namespace tensorray {
@@ -35,10 +36,16 @@ Camera chosen_camera(const CameraDescription& description, const std::vector<Eig
   return camera;
 }
 
-Eigen::AlignedBox3d box_of(const std::vector<Eigen::Vector3d>& points) {
+/// The camera of the scene, which has a position.
+Camera given_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points) {
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& point : points) box.extend(point);
-  return box;
+  const Eigen::Vector3d target = description.target.value_or(box.center());
+  const Eigen::Vector3d up = description.up.value_or(Eigen::Vector3d::UnitZ());
+  if (description.projection == Projection::perspective)
+    return perspective_camera(*description.position, target, up, description.angle, description.resolution);
+  const double height = description.height.value_or(1.1 * box.diagonal().norm());
+  return orthographic_camera(*description.position, target, up, height, description.resolution);
 }
 
 /// @param environments  Of the lights before this one; changed.
@@ -70,16 +77,14 @@ Light make_light(const LightSourceDescription& light, const ShownLights& all, st
 
 }  // namespace
 
-Camera make_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double free) {
-  if (!description.position) return with_lens(chosen_camera(description, points, free), description);
-  const Eigen::AlignedBox3d box = box_of(points);
-  const Eigen::Vector3d target = description.target.value_or(box.center());
-  const Eigen::Vector3d up = description.up.value_or(Eigen::Vector3d::UnitZ());
-  if (description.projection == Projection::perspective)
-    return with_lens(perspective_camera(*description.position, target, up, description.angle, description.resolution),
-                     description);
-  const double height = description.height.value_or(1.1 * box.diagonal().norm());
-  return with_lens(orthographic_camera(*description.position, target, up, height, description.resolution), description);
+Camera make_camera(const SceneDescription& scene, const std::vector<Eigen::Vector3d>& points, double free) {
+  try {
+    return with_lens(
+        scene.camera.position ? given_camera(scene.camera, points) : chosen_camera(scene.camera, points, free),
+        scene.camera);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(fmt::format("{}: `/camera`: {}", scene.path.string(), error.what()));
+  }
 }
 
 std::vector<Light> make_lights(const SceneDescription& description, const ShownLights& shown, const Camera& camera) {

@@ -1,5 +1,3 @@
-#include "integrators/photon_distribution/mesh_light.h"
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -11,6 +9,7 @@
 
 #include "base/process/seconds.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
+#include "integrators/photon_distribution/plate_light.h"
 #include "renderer/film/image_distance.h"
 #include "renderer/film/spectral_image.h"
 #include "scenes/scene/fine_bands.h"
@@ -72,15 +71,16 @@ PlateLight draw(const Scene& scene, FlowMap map, const Sweep& sweep, Ranks* rank
   const CausticSettings settings{scene.bands.size(), scene.description.output.wants("spectral"), sweep.step, ranks};
   Caustic caustic = draw_caustic(light.map, *scene.geometry.surfaces().plate, bands_of(scene, light.map, sweep.bands),
                                  settings, progress);
-  light.linear = color_image(caustic.color);
+  light.render.linear = color_image(caustic.color);
   light.irradiance = std::move(caustic.irradiance);
-  light.statistics.seconds_density = seconds_since(start);
-  light.statistics.positions = light.map.starts.size();
-  light.statistics.ends = caustic.ends;
-  light.statistics.power = beam_power(scene, caustic);
-  light.statistics.ray_steps = light.map.ray_steps;
-  light.statistics.tensor_samples = light.map.tensor_samples;
-  gather_counts(ranks, light.statistics);
+  Statistics& statistics = light.render.statistics;
+  statistics.seconds_density = seconds_since(start);
+  statistics.positions = light.map.starts.size();
+  statistics.ends = caustic.ends;
+  statistics.power = beam_power(scene, caustic);
+  statistics.ray_steps = light.map.ray_steps;
+  statistics.tensor_samples = light.map.tensor_samples;
+  gather_counts(ranks, statistics);
   return light;
 }
 
@@ -108,7 +108,7 @@ PlateLight trace_and_draw(const MeshJob& job, double tolerance, const Sweep& swe
   FlowMap map = trace(job, tolerance, progress);
   const double seconds = seconds_since(start);
   PlateLight light = draw(job.scene, std::move(map), sweep, job.ranks, progress);
-  light.statistics.seconds_tracing = seconds;
+  light.render.statistics.seconds_tracing = seconds;
   return light;
 }
 
@@ -137,16 +137,16 @@ PlateLight refine(const MeshJob& job, double bound, const Progress& progress) {
   for (;;) {
     tolerance /= 2;
     PlateLight finer = trace_and_draw(job, tolerance, refined_sweep(tolerance), labelled);
-    const double change = broadcast(job.ranks, relative_distance(light.linear, finer.linear));
+    const double change = broadcast(job.ranks, relative_distance(light.render.linear, finer.render.linear));
     const double error = rest_after(change, last_change);
     last_change = change;
-    finer.statistics.error = error;
-    add_cost(light.statistics, finer.statistics);
+    finer.render.statistics.error = error;
+    add_cost(light.render.statistics, finer.render.statistics);
     light = std::move(finer);
     label = fmt::format(" (error {:.2g}%)", 100 * error);
     if (error <= bound) return light;
     if (!light.map.is_complete || tolerance < min_tolerance) {
-      light.warnings.push_back(
+      light.render.warnings.push_back(
           fmt::format("the picture's error is {:.2g}%, not {:.2g}%: {}", 100 * error, 100 * bound,
                       light.map.is_complete ? "positions are single precision" : "raise `light.photons`"));
       return light;
@@ -167,7 +167,7 @@ PlateLight mesh_light(const Scene& scene, const Progress& progress, Job* job, co
   } else {
     light = trace_and_draw(mesh, density.tolerance, {}, progress);
     if (!light.map.is_complete)
-      light.warnings.push_back(
+      light.render.warnings.push_back(
           "the light on the plate is coarser than `integrator.density.tolerance` asks: raise `light.photons`");
   }
   return mesh.is_shard ? PlateLight() : light;

@@ -100,6 +100,44 @@ std::unique_ptr<FluenceSums> make_fluence(const PhotonJob& job) {
   return std::make_unique<FluenceSums>(job.field, std::move(powers), job.settings.fluence == FluenceKind::bands, rays);
 }
 
+/// Which light it is, and what is kept of it.
+struct KeptKind {
+  std::uint64_t channels = 0;
+  std::uint32_t is_colored = 0, has_fluence = 0, has_photons = 0;
+};
+
+void add_photons(Archive& archive, PhotonSums& sums) {
+  std::uint64_t chunks = sums.photons.size(), chunk = 0;
+  archive.copy(chunks);
+  for (auto& [number, photons] : sums.photons) {
+    if (archive.reads()) break;
+    chunk = number;
+    archive.copy(chunk);
+    archive.copy_list(photons);
+  }
+  for (std::uint64_t i = 0; archive.reads() && i < chunks; ++i) {
+    std::vector<PlatePhoton> photons;
+    archive.copy(chunk);
+    archive.copy_list(photons);
+    if (sums.has_photons) sums.photons[chunk] = std::move(photons);
+  }
+}
+
+/// As bytes of their own, which those who do not want it leave out.
+void add_fluence(Archive& archive, PhotonSums& sums) {
+  std::string bytes;
+  if (sums.fluence && !archive.reads()) {
+    Archive fluence;
+    sums.fluence->copy_sums(fluence);
+    bytes = fluence.take();
+  }
+  archive.copy_list(bytes);
+  if (!sums.fluence || !archive.reads()) return;
+  Archive fluence(bytes);
+  sums.fluence->copy_sums(fluence);
+  fluence.finish();
+}
+
 }  // namespace
 
 PixelMap::PixelMap(const Plate& plate)
@@ -228,6 +266,22 @@ void ChunkTracer::take_counts(PhotonSums& sums) {
       for (int end = 0; end < ray_end_count; ++end) sums.ends[channel][end] += worker.ends[channel][end];
     worker.ends.clear();
   }
+}
+
+void copy_sums(Archive& archive, PhotonSums& sums) {
+  const KeptKind wanted{sums.ends.size(), sums.is_colored, sums.fluence != nullptr, sums.has_photons};
+  KeptKind kind = wanted;
+  archive.copy(kind);
+  if (kind.channels != wanted.channels || kind.is_colored != wanted.is_colored ||
+      kind.has_fluence < wanted.has_fluence || kind.has_photons < wanted.has_photons)
+    throw DamagedArchive(
+        "the photons that were kept are those of other outputs: from the beginning, ask for the same of `spectral`, "
+        "`photons` and `fluence`");
+  for (std::uint64_t* count : {&sums.candidates, &sums.ray_steps, &sums.tensor_samples}) archive.copy_sums(count, 1);
+  for (EndCounts& ends : sums.ends) archive.copy_sums(ends.data(), ends.size());
+  add_fluence(archive, sums);
+  add_photons(archive, sums);
+  sums.density->copy_sums(archive);
 }
 
 }  // namespace tensorray

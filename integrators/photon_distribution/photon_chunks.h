@@ -2,16 +2,21 @@
 /// @file integrators/photon_distribution/photon_chunks.h
 /// Traces photons in chunks of positions. What a chunk gives is a function of its number alone.
 
+#include <cstddef>
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 #include <tbb/enumerable_thread_specific.h>
 
+#include "base/process/archive.h"
 #include "base/process/progress.h"
+#include "integrators/photon_distribution/fluence.h"
 #include "integrators/photon_distribution/photon_distribution.h"
-#include "integrators/photon_distribution/photon_sums.h"
+#include "renderer/density/density.h"
 #include "renderer/film/plate_photon.h"
 #include "renderer/lights/beam.h"
 #include "tracing/bending/bending.h"
@@ -51,6 +56,23 @@ struct PhotonJob {
   std::uint64_t chunk_size() const;  ///< Positions of a chunk; the last one may have fewer.
   std::uint64_t chunks() const { return (positions.candidates() + chunk_size() - 1) / chunk_size(); }
 };
+
+/// What photons give together. Sums of some chunks of photons can be added to those of others: the result does not
+/// depend on the order, nor on which process has traced which chunk.
+struct PhotonSums {
+  std::uint64_t candidates = 0;  ///< Of the beam (BeamSampler), whether they emitted or not.
+  std::uint64_t ray_steps = 0, tensor_samples = 0;
+  std::vector<EndCounts> ends;              ///< By channel.
+  std::optional<DensityEstimator> density;  ///< The light on the plate.
+  std::unique_ptr<FluenceSums> fluence;     ///< Null: not wanted.
+  bool is_colored = false;                  ///< Whether the light on the plate is red, green and blue, not by channel.
+  bool has_photons = false;                 ///< Whether photons are wanted.
+  std::map<std::uint64_t, std::vector<PlatePhoton>> photons;  ///< By the number of their chunk.
+};
+
+/// Writes the sums, or adds those of other photons. What these sums do not want is left out.
+/// @throw DamagedArchive if they are those of other light, or have not all that is wanted.
+void copy_sums(Archive& archive, PhotonSums& sums);
 
 /// Sums for photons of the job, without any photons.
 PhotonSums empty_sums(const PhotonJob& job);

@@ -7,7 +7,6 @@
 
 #include "base/process/seconds.h"
 #include "integrators/photon_distribution/photon_chunks.h"
-#include "integrators/photon_distribution/photon_sums.h"
 
 namespace tensorray {
 namespace {

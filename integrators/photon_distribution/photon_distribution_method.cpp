@@ -8,7 +8,6 @@
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
 #include "integrators/photon_distribution/plate_light.h"
-#include "integrators/photon_distribution/plate_map.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/annotations.h"
 #include "scenes/outputs/picture_outputs.h"
@@ -78,21 +77,16 @@ double side_share(const Statistics& statistics) {
 Render render_of(const Scene& scene, PlateLight light, const Progress& progress, Job* job) {
   const SceneDescription& description = scene.description;
   const auto start = Clock::now();
-  Render result;
-  const bool has_map = !light.map.triangles.empty() && description.output.wants("exr");
-  result.linear =
-      has_map ? with_channels(light.linear, plate_map(light.map, scene, progress, job)) : std::move(light.linear);
+  Render result = std::move(light.render);
+  if (!light.map.triangles.empty() && description.output.wants("exr"))
+    result.linear = with_channels(result.linear, plate_map(light.map, scene, progress, job));
   if (job && !is_root(job->ranks)) return {};
   if (description.output.wants("spectral"))
     result.spectral = spectral_image(light.irradiance, scene.bands, SpectralQuantity::irradiance,
                                      description.light.irradiance, to_working(scene));
-  result.view = view_of(*scene.geometry.surfaces().plate);
+  result.view = picture_view(*scene.geometry.surfaces().plate);
   if (description.output.wants(Annotation::legend)) result.draw_legend = light_legend(scene);
-  result.photons = std::move(light.photons);
-  result.grids = std::move(light.fluence);
   name_fluence(scene, result.grids);
-  result.statistics = std::move(light.statistics);
-  result.warnings = std::move(light.warnings);
   if (result.statistics.error) result.metadata["tensorray:error"] = fmt::format("{:.3g}", *result.statistics.error);
   result.metadata["tensorray:photons"] = std::to_string(result.statistics.positions);
   result.statistics.seconds_color = seconds_since(start);
@@ -137,17 +131,19 @@ void write_photons(const std::filesystem::path& file, const Scene& scene, const 
   write_points(file, point_cloud(render.photons, provenance(scene, render)));
 }
 
-/// What the picture and its files take, for each pixel of the plate. Drawing a mesh needs planes of colours; where
-/// bands are wanted, also planes of bands, and a spectral picture of them; the map of the mesh is a picture of its own.
-double bytes_per_pixel(const SceneDescription& scene, PhotonDensityKind kind) {
+/// What the picture takes while it is made, for each pixel of the plate: films, and pictures of single precision.
+std::size_t bytes_per_pixel(const SceneDescription& scene, PhotonDensityKind kind) {
   const bool is_spectral = scene.output.wants("spectral");
-  const double channels = channel_count(scene);
-  if (kind == PhotonDensityKind::mesh)
-    return 42 + (scene.output.wants("exr") ? 70 : 0) + (is_spectral ? 13 * channels : 0);
-  // Sums, the film and pictures; photon differentials keep their sums as text, too.
-  const bool has_text = kind == PhotonDensityKind::photon_differential;
-  if (is_spectral || channels <= 3) return (has_text ? 36 : 24) * channels;
-  return has_text ? 78 : 58;
+  const auto channels = static_cast<std::size_t>(channel_count(scene));
+  const std::size_t linear = 3 * sizeof(float);
+  if (kind == PhotonDensityKind::mesh) {
+    const std::size_t map = plate_map_channels() * sizeof(float);
+    return 3 * sizeof(double) + linear + (scene.output.wants("exr") ? linear + 2 * map : 0) +
+           (is_spectral ? channels * (sizeof(double) + sizeof(float)) : 0);
+  }
+  const std::size_t planes = is_spectral || channels <= 3 ? channels : 3;
+  const std::size_t blurred = kind == PhotonDensityKind::gaussian ? sizeof(double) : 0;
+  return planes * (sizeof(std::int64_t) + sizeof(double) + blurred + (is_spectral ? sizeof(float) : 0)) + linear;
 }
 
 class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
@@ -157,15 +153,11 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
   std::string preferred_view() const override { return soft_highlights_view; }
 
   std::vector<Output> outputs() const override {
-    std::vector<Output> outputs = picture_outputs();
-    outputs.push_back(spectral_output());
-    outputs.push_back({"photons", "the photons, one by one", {".vdb", ".vtp"}, write_photons});
-    outputs.push_back(
-        {"fluence", "the light inside the volume, as a fog volume", {".vdb"}, write_grids, ".fluence.vdb"});
-    return outputs;
+    return picture_outputs(
+        {spectral_output(),
+         {"photons", "the photons, one by one", {".vdb", ".vtp"}, write_photons},
+         {"fluence", "the light inside the volume, as a fog volume", {".vdb"}, write_grids, ".fluence.vdb"}});
   }
-
-  std::vector<ChannelText> channels() const override { return plate_map_texts(); }
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
     const bool draws_mesh = settings().density.kind == PhotonDensityKind::mesh;
@@ -176,7 +168,7 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
       scene.warnings.push_back("`/integrator/density/error` bounds only the error of the light on a plate");
     if (!chosen) return;
     check_spectral_output(scene, source);
-    check_receiver_memory(scene, bytes_per_pixel(scene, settings().density.kind), source);
+    check_receiver_memory(scene, static_cast<double>(bytes_per_pixel(scene, settings().density.kind)), source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
     if (settings().density.kind != PhotonDensityKind::photon_differential &&
         given(json, "/integrator/density/footprint"))

@@ -2,7 +2,6 @@
 /// @file integrators/photon_distribution/photon_distribution_method.h
 /// The method "photon_distribution": the bent light on the plate and inside the volume.
 
-#include <array>
 #include <memory>
 #include <optional>
 
@@ -32,11 +31,11 @@ struct PhotonDescription {
   bool side_light = true;  ///< Whether light that leaves the volume by its side faces falls on the plate.
 };
 
-inline auto choices(PhotonDensityKind) {
-  using C = Choice<PhotonDensityKind>;
-  return std::array{C{"mesh", PhotonDensityKind::mesh}, C{"gaussian", PhotonDensityKind::gaussian},
-                    C{"histogram", PhotonDensityKind::histogram},
-                    C{"photon_differential", PhotonDensityKind::photon_differential}};
+inline Choices<PhotonDensityKind> choices(PhotonDensityKind) {
+  return {{"mesh", PhotonDensityKind::mesh},
+          {"gaussian", PhotonDensityKind::gaussian},
+          {"histogram", PhotonDensityKind::histogram},
+          {"photon_differential", PhotonDensityKind::photon_differential}};
 }
 
 /// The estimator for photons. `mesh` needs no photons; photons for other outputs are then only counted.
@@ -47,8 +46,7 @@ inline DensitySettings estimator_of(const PhotonDensity& density) {
   return settings;
 }
 
-template <class Visitor>
-void describe(PhotonDensity& density, Visitor& visit) {
+inline void describe(PhotonDensity& density, KeyVisitor& visit) {
   visit("kind", density.kind, "method that computes irradiance from rays", knob());
   visit("tolerance", density.tolerance, "mesh: wanted error of landings, in pixels",
         between(0.001, 100).as_knob(0.05, 5));
@@ -59,8 +57,7 @@ void describe(PhotonDensity& density, Visitor& visit) {
         between(0.01, 100).as_knob(0.1, 10));
 }
 
-template <class Visitor>
-void describe(PhotonDescription& photons, Visitor& visit) {
+inline void describe(PhotonDescription& photons, KeyVisitor& visit) {
   visit.section("density", photons.density, "photon_distribution: estimation of irradiance on the plate");
   visit("side_light", photons.side_light,
         "photon_distribution: whether light that leaves the volume by its side faces falls on the plate");

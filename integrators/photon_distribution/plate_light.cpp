@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "base/process/seconds.h"
-#include "integrators/photon_distribution/mesh_light.h"
 #include "integrators/photon_distribution/photon_distribution.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
 #include "renderer/film/spectral_image.h"
@@ -37,12 +36,12 @@ PhotonSettings photon_settings(const Scene& scene, Job* job) {
 
 PlateLight light_of(const Scene& scene, PhotonDistribution traced) {
   PlateLight light;
-  light.linear = is_collected_in_color(scene) ? color_image(traced.irradiance)
-                                              : linear_image(traced.irradiance, scene.bands, to_working(scene));
+  light.render.linear = is_collected_in_color(scene) ? color_image(traced.irradiance)
+                                                     : linear_image(traced.irradiance, scene.bands, to_working(scene));
   light.irradiance = std::move(traced.irradiance);
-  light.photons = std::move(traced.photons);
-  light.fluence = std::move(traced.fluence);
-  Statistics& statistics = light.statistics;
+  light.render.photons = std::move(traced.photons);
+  light.render.grids = std::move(traced.fluence);
+  Statistics& statistics = light.render.statistics;
   statistics.positions = traced.positions;
   statistics.ends = std::move(traced.ends);
   for (const LightChannel& channel : scene.channels)
@@ -80,10 +79,10 @@ PlateLight light_on_plate(const Scene& scene, const Progress& progress, Job* job
   const OutputDescription& output = scene.description.output;
   const bool is_shard = job && job->is_shard;  // Photons are then traced where shards are merged.
   if ((!output.wants("photons") && !output.wants("fluence")) || is_shard) return light;
-  PlateLight photons = trace_photons(scene, settings, progress);
-  light.photons = std::move(photons.photons);
-  light.fluence = std::move(photons.fluence);
-  add_cost(photons.statistics, light.statistics);
+  Render photons = trace_photons(scene, settings, progress).render;
+  light.render.photons = std::move(photons.photons);
+  light.render.grids = std::move(photons.grids);
+  add_cost(photons.statistics, light.render.statistics);
   return light;
 }
 

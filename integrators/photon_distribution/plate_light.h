@@ -3,28 +3,22 @@
 /// The light of a scene on its plate and inside its volume.
 
 #include <functional>
-#include <string>
-#include <vector>
 
+#include "base/process/job.h"
 #include "base/process/progress.h"
 #include "renderer/film/film.h"
-#include "renderer/film/plate_photon.h"
 #include "renderer/images/image.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "tracing/flow/flow_map.h"
-#include "volumes/grids/scalar_grid.h"
 
 namespace tensorray {
 
 struct PlateLight {
-  Image linear;                      ///< R, G, B in the working space; 1 is the undisturbed light.
-  FlowMap map;                       ///< The map that `mesh` has drawn; empty for other estimators.
-  Film irradiance;                   ///< A plane for each band, if the scene writes spectral pictures.
-  std::vector<PlatePhoton> photons;  ///< If the scene writes photons.
-  std::vector<ScalarGrid> fluence;   ///< If the scene writes the fluence; see PhotonDistribution.
-  Statistics statistics;             ///< Without `seconds_color`.
-  std::vector<std::string> warnings;
+  Render render;  ///< `linear` (1 is the undisturbed light); photons and fluence, if the scene writes them; statistics,
+                  ///< without `seconds_color`; warnings.
+  FlowMap map;    ///< The map that `mesh` has drawn; empty for other estimators.
+  Film irradiance;  ///< A plane for each band, if the scene writes spectral pictures.
 };
 
 /// Adds the time, the steps and the samples of other work.
@@ -39,5 +33,22 @@ using ShowLight = std::function<void(PlateLight)>;
 /// @param show  Gets the light so far when the job wants a picture; may be empty.
 /// @throw Cancelled; as Ranks::all_gather.
 PlateLight light_on_plate(const Scene& scene, const Progress& progress, Job* job = nullptr, const ShowLight& show = {});
+
+/// The light of a scene with the density `mesh`: drawn from the flow map of the beam, with the ranks of the job. Its
+/// shards and checkpoints have the landings of its flow maps' vertices (FlowSettings::is_kept): of a shard, the result
+/// is empty. With a bound of the error, a shard refines until the error of its own part is below it; what more the
+/// whole picture needs is traced where the shards are merged.
+/// @param job   Null: alone, and nothing is kept. @param show  Gets the light so far when the job wants a picture.
+/// @throw Cancelled; as Ranks::all_gather.
+PlateLight mesh_light(const Scene& scene, const Progress& progress, Job* job, const ShowLight& show);
+
+/// The number of channels of plate_map.
+std::size_t plate_map_channels();
+
+/// How the light of the band nearest to 550 nm (in RGB mode: green) lands at the centre of each pixel. All channels are
+/// 0 where no light lands. Where the map folds, they describe the sheet that is displaced least.
+/// @param map   To the plate of the scene. Runs on all threads; the result does not depend on their number.
+/// @param job   Whose ranks have the same map and do this together, for the root; null: alone.
+Image plate_map(const FlowMap& map, const Scene& scene, const Progress& progress, Job* job = nullptr);
 
 }  // namespace tensorray

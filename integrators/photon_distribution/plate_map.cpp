@@ -1,9 +1,8 @@
-#include "integrators/photon_distribution/plate_map.h"
-
 #include <algorithm>
 
 #include <Eigen/Geometry>
 
+#include "integrators/photon_distribution/plate_light.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/scene/fine_bands.h"
 #include "tracing/flow_drawing/flow_view.h"
@@ -47,29 +46,20 @@ double limited(double logarithm) { return std::clamp(logarithm, -100.0, 100.0); 
 
 ChannelTable<PlateLanding> plate_channels() {
   using Landing = const PlateLanding&;
-  return {
-      {{"displacement.x", "displacement.y", "displacement.z"},
-       "From where straight light would land to where the light lands; world units.",
-       [](Landing landing) { return landing.moved; }},
-      {{"magnification.log"},
-       "ln of the area on which light lands, divided by its area across the beam: negative where light is gathered.",
-       [](Landing landing) { return limited(landing.stretch.logs.sum()); }},
-      {{"magnification.major", "magnification.minor", "magnification.angle"},
-       "The same along the two principal directions (ln σ₁ ≥ ln σ₂ of the Jacobian, from −100 to 100), and the angle "
-       "of the first on the plate, from its right axis towards its up axis, from −π/2 to π/2.",
-       [](Landing landing) -> Vector3d {
-         return {limited(landing.stretch.logs[0]), limited(landing.stretch.logs[1]), landing.stretch.angle};
-       }},
-      {{"folds"}, "The number of sheets that land here.", [](Landing landing) { return landing.point.sheets; }},
-      {{"length"}, "The length of the light's way, world units.", [](Landing landing) { return landing.point.length; }},
-      {{"error"}, "The estimated error of landings about here, in pixels; at most 100.", [](Landing landing) {
-         return std::min(landing.point.error, 100.0f);
-       }}};
+  return {{{"displacement.x", "displacement.y", "displacement.z"}, [](Landing landing) { return landing.moved; }},
+          {{"magnification.log"}, [](Landing landing) { return limited(landing.stretch.logs.sum()); }},
+          {{"magnification.major", "magnification.minor", "magnification.angle"},
+           [](Landing landing) -> Vector3d {
+             return {limited(landing.stretch.logs[0]), limited(landing.stretch.logs[1]), landing.stretch.angle};
+           }},
+          {{"folds"}, [](Landing landing) { return landing.point.sheets; }},
+          {{"length"}, [](Landing landing) { return landing.point.length; }},
+          {{"error"}, [](Landing landing) { return std::min(landing.point.error, 100.0f); }}};
 }
 
 }  // namespace
 
-std::vector<ChannelText> plate_map_texts() { return channel_texts(plate_channels()); }
+std::size_t plate_map_channels() { return channel_names(plate_channels()).size(); }
 
 Image plate_map(const FlowMap& map, const Scene& scene, const Progress& progress, Job* job) {
   const Plate& plate = *scene.geometry.surfaces().plate;

@@ -1,11 +1,10 @@
-#include "integrators/scene/photons.h"
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "base/constants.h"
 #include "base/overloaded.h"
+#include "integrators/scene/field_light.h"
 
 namespace tensorray {
 namespace {
@@ -98,8 +97,8 @@ PhotonPairs photon_pairs(const LitObjects& lit, const SceneMethodDescription& se
   return pairs;
 }
 
-PhotonMaps photons_of(const LitObjects& lit, const PhotonPairs& pairs, const BendingRegion& region,
-                      const PhotonsDescription& description, int passes, const Progress& progress) {
+PhotonMaps trace_object_photons(const LitObjects& lit, const PhotonPairs& pairs, const BendingRegion& region,
+                                const PhotonsDescription& description, int passes, const Progress& progress) {
   const TensorField& field = lit.scene.field;
   PhotonTracerSettings settings;
   settings.per_pass = description.per_pass;

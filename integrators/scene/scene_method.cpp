@@ -8,14 +8,11 @@
 
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
-#include "integrators/path_tracing/path_tracing_description.h"
+#include "integrators/path_tracing/path_tracing_method.h"
 #include "integrators/path_tracing/stage.h"
-#include "integrators/path_tracing/studio.h"
+#include "integrators/scene/field_light.h"
 #include "integrators/scene/field_region.h"
 #include "integrators/scene/objects.h"
-#include "integrators/scene/photons.h"
-#include "integrators/scene/scene_method_description.h"
-#include "integrators/scene/sunlight.h"
 #include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/annotations.h"
@@ -65,14 +62,6 @@ std::vector<Vector3d> points_of_interest(const Scene& scene, const std::vector<S
     }
   }
   return points;
-}
-
-Camera scene_camera(const Scene& scene, const std::vector<Vector3d>& points) {
-  try {
-    return make_camera(scene.description.camera, points, 0);
-  } catch (const std::invalid_argument& error) {
-    throw SceneError(fmt::format("{}: `/camera`: {}", scene.description.path.string(), error.what()));
-  }
 }
 
 /// The volume for rays that are seen. Surfaces that reach into it stop light there; if there are any, all surfaces
@@ -174,7 +163,6 @@ class LoadedObjects : public LoadedMethod {
 
  private:
   FieldLight trace_light(const LitObjects& lit, const FieldRegion& region, int passes, const Progress& progress) const;
-  void add_picture(const Scene& scene, const LightGroups& groups, const SurfacePicture& picture, Render& render) const;
 
   ObjectScene loaded_;
 };
@@ -183,17 +171,8 @@ class LoadedObjects : public LoadedMethod {
 FieldLight LoadedObjects::trace_light(const LitObjects& lit, const FieldRegion& region, int passes,
                                       const Progress& progress) const {
   const PhotonPairs pairs = photon_pairs(lit, loaded_.settings);
-  return {photons_of(lit, pairs, region, loaded_.settings.photons, passes, progress),
+  return {trace_object_photons(lit, pairs, region, loaded_.settings.photons, passes, progress),
           land_light(lit, pairs, loaded_.lights.light, loaded_.settings.caustic, progress)};
-}
-
-void LoadedObjects::add_picture(const Scene& scene, const LightGroups& groups, const SurfacePicture& picture,
-                                Render& render) const {
-  const ShownLight& light = loaded_.lights.light;
-  render.linear = make_image(picture, light, loaded_.tracing, groups);
-  if (scene.description.output.wants("spectral"))
-    render.spectral =
-        spectral_image(picture.radiance, light.bands, SpectralQuantity::radiance, 1, light.xyz_to_working);
 }
 
 Render LoadedObjects::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
@@ -201,7 +180,7 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   Clock::time_point start = Clock::now();
   Render result;
   const std::vector<Light> lights = scene_lights(scene, loaded_.lights, {});
-  const Camera camera = scene_camera(scene, points_of_interest(scene, loaded_.objects, lights));
+  const Camera camera = make_camera(scene.description, points_of_interest(scene, loaded_.objects, lights), 0);
   std::vector<SceneObject> objects = loaded_.objects;
   make_tubes(scene, tube_error * pixel_size(camera, scene.field.world_box().center()), job, progress, objects);
   std::vector<ShadedSurface> surfaces;
@@ -216,8 +195,7 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   const bool bends = bends_light(scene, light.bands);
   ShadedScene shaded{stage, materials, sampler, table};
   if (bends) shaded.region = &region;
-  const LightGroups groups = light_groups(scene.description);
-  set_groups(groups, shaded);
+  set_groups(scene.description, shaded);
   shaded.bands_per_view = loaded_.settings.bands_per_sample;
   shaded.bands_per_bounce = bands_per_bounce(loaded_.settings);
   const PathTracerSettings samples = object_tracer_settings(scene, loaded_, camera, 0);
@@ -233,15 +211,14 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
 
   start = Clock::now();
   result.exposure = 0;
-  result.view = view_of(camera);
-  const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {
-    Render shown = result;
-    add_picture(scene, groups, picture, shown);
-    return shown;
-  });
+  result.view = picture_view(camera);
+  const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
+    set_picture(picture, light, loaded_.tracing, scene.description, render);
+  };
+  const RenderCallbacks callbacks = render_callbacks(progress, job, result, add_picture);
   const PathTracerSettings settings = object_tracer_settings(scene, loaded_, camera, result.statistics.seconds_tracing);
   const SurfacePicture picture = render_surfaces(shaded, camera, settings, callbacks);
-  add_picture(scene, groups, picture, result);
+  add_picture(picture, result);
   for (const PixelState& pixel : picture.pixels)
     result.statistics.scene_method->samples += static_cast<std::uint64_t>(pixel.samples);
   report(region, loaded_, result);
@@ -261,13 +238,7 @@ class SceneMethod : public MethodWith<SceneMethodDescription> {
                        [](const ObjectDescription& object) { return object.paths.has_value(); });
   }
 
-  std::vector<Output> outputs() const override {
-    std::vector<Output> outputs = picture_outputs();
-    outputs.push_back(spectral_output());
-    return outputs;
-  }
-
-  std::vector<ChannelText> channels() const override { return surface_channel_texts(true); }
+  std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override;
   void check_photons(const SceneDescription& scene, const PathTracingDescription& tracing,

@@ -1,4 +1,4 @@
-#include "integrators/scene/sunlight.h"
+#include "integrators/scene/field_light.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include "base/constants.h"
 #include "base/overloaded.h"
-#include "integrators/path_tracing/studio.h"
+#include "integrators/path_tracing/stage.h"
 #include "tracing/flow_drawing/flow_irradiance.h"
 
 namespace tensorray {

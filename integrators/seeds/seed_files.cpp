@@ -1,15 +1,13 @@
-#include "integrators/seeds/seed_files.h"
-
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 
 #include "base/errors.h"
+#include "base/text/parse_number.h"
 #include "base/text/text.h"
+#include "integrators/seeds/seeds.h"
 
 namespace tensorray {
 namespace {
@@ -26,14 +24,6 @@ std::vector<std::string> words_of(std::string line) {
   return words;
 }
 
-/// Parses a number, independent of the locale. @return false if `word` is not a number.
-bool parse(const std::string& word, double& value) {
-  const char* first = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
-  const char* last = word.data() + word.size();
-  const auto result = std::from_chars(first, last, value);
-  return result.ec == std::errc() && result.ptr == last;
-}
-
 /// A line, which ends with a line feed, a carriage return, or both. @return false at the end of the file.
 bool get_line(std::istream& file, std::string& line) {
   line.clear();
@@ -44,17 +34,16 @@ bool get_line(std::istream& file, std::string& line) {
 }
 
 bool is_header(const std::vector<std::string>& words) {
-  double unused;
-  for (const std::string& word : words)
-    if (parse(word, unused)) return false;
-  return true;
+  return std::none_of(words.begin(), words.end(), [](const std::string& word) { return parse_number(word); });
 }
 
 void add_seed(const std::vector<std::string>& words, SeedList& seeds) {
   double numbers[6];
-  for (std::size_t i = 0; i < words.size(); ++i)
-    if (!parse(words[i], numbers[i]) || !std::isfinite(numbers[i]))
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    numbers[i] = parse_number(words[i]).value_or(NAN);
+    if (!std::isfinite(numbers[i]))
       throw std::runtime_error("\"" + escaped(words[i].substr(0, 40)) + "\" is not a finite number");
+  }
   seeds.positions.emplace_back(numbers[0], numbers[1], numbers[2]);
   if (words.size() == 3) return;
   const Eigen::Vector3d direction = Eigen::Vector3d(numbers[3], numbers[4], numbers[5]).stableNormalized();

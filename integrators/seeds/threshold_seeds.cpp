@@ -1,5 +1,3 @@
-#include "integrators/seeds/threshold_seeds.h"
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -8,6 +6,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "integrators/seeds/seeds.h"
 #include "renderer/sampling/random.h"
 #include "volumes/bricks/brick_point.h"
 #include "volumes/sampling/sample_tensors.h"
@@ -57,7 +56,7 @@ void judge_some(const TensorField& field, const Threshold& threshold, const Cand
     Eigen::Matrix3d tensor;
     for (int component = 0; component < 9; ++component)
       tensor.data()[component] = double{candidates.tensors[component][i]};
-    values[i] = threshold.value(tensor);
+    values[i] = invariant(threshold.invariant, tensor);
   }
 }
 
@@ -76,26 +75,20 @@ std::vector<double> judge(const TensorField& field, const Threshold& threshold, 
 [[noreturn]] void refuse(const Threshold& threshold, std::size_t found, std::uint64_t count, double smallest,
                          double largest) {
   std::ostringstream text;
-  text << "only " << found << " of " << count << " seeds found where the threshold wants values from "
-       << threshold.least << " to " << threshold.greatest << ": in the box ";
-  if (smallest <= largest)
-    text << "they are from " << smallest << " to " << largest << "; widen the threshold, or ask for fewer seeds";
-  else
-    text << "none is a number";
-  throw std::runtime_error(text.str());
+  text << "only " << found << " of " << count << " seeds found where the threshold wants values from " << threshold.min
+       << " to " << threshold.max << ": in the box they are from " << smallest << " to " << largest
+       << "; widen the threshold, or ask for fewer seeds";
+  throw std::invalid_argument(text.str());
 }
 
 }  // namespace
 
-std::vector<Eigen::Vector3d> threshold_seeds(const TensorField& field, const Eigen::AlignedBox3d& bounds,
-                                             const Threshold& threshold, std::uint64_t count, std::uint64_t seed) {
+std::vector<Eigen::Vector3d> threshold_seeds(const TensorField& field, const Threshold& threshold, std::uint64_t count,
+                                             std::uint64_t seed) {
   if (count == 0) throw std::invalid_argument("the count of seeds must be 1 or more");
-  if (!(threshold.least <= threshold.greatest))
-    throw std::invalid_argument(
-        "the threshold of seeds is empty: its greatest value must not be below its least value");
-  const CandidateSequence sequence{field.world_box().intersection(bounds), seed};
-  if (sequence.box.isEmpty())
-    throw std::invalid_argument("the box of threshold seeds does not meet the field's extent");
+  if (!(threshold.min <= threshold.max))
+    throw std::invalid_argument("the threshold of seeds is empty: its max must not be below its min");
+  const CandidateSequence sequence{field.world_box(), seed};
   std::vector<Eigen::Vector3d> seeds;
   double smallest = std::numeric_limits<double>::infinity(), largest = -smallest;
   for (std::uint32_t first = 0; first < (seeds.empty() ? enough_to_give_up : max_candidates); first += block) {
@@ -104,7 +97,7 @@ std::vector<Eigen::Vector3d> threshold_seeds(const TensorField& field, const Eig
       if (std::isnan(values[i])) continue;
       smallest = std::min(smallest, values[i]);
       largest = std::max(largest, values[i]);
-      if (values[i] < threshold.least || values[i] > threshold.greatest) continue;
+      if (values[i] < threshold.min || values[i] > threshold.max) continue;
       seeds.push_back(sequence.at(first + i));
       if (seeds.size() == count) return seeds;
     }

@@ -74,11 +74,9 @@ struct StretchPixel {
 
 ChannelTable<StretchPixel> stretch_channels() {
   using Pixel = const StretchPixel&;
-  return {{{"R", "G", "B"},
-           "The colour of the colour map, scene-linear; 0 where A is.",
-           [](Pixel pixel) { return pixel.color; }},
-          {{"A"}, "1; 0 if the ray does not meet the volume, or ends before the length.", [](Pixel) { return 1; }},
-          {{"stretch"}, "ln σ / L, in 1 / world unit; 0 where A is.", [](Pixel pixel) { return pixel.stretch; }}};
+  return {{{"R", "G", "B"}, [](Pixel pixel) { return pixel.color; }},
+          {{"A"}, [](Pixel) { return 1; }},
+          {{"stretch"}, [](Pixel pixel) { return pixel.stretch; }}};
 }
 
 /// Makes the pictures from the values at the pixels of the entry plane, which is seen along the light as the plate is.
@@ -121,16 +119,16 @@ class LoadedStretch : public LoadedMethod {
     }
     if (output.wants("image") || output.wants("exr")) {
       const Plate plane = entry_plane(scene, description_.pixels);
-      if (job && job->show && is_root(job->ranks))
+      if (job)
         settings.show = [&](const std::vector<float>& picture) {
-          if (!job->picture_wanted.exchange(false)) return;
+          if (!job->takes_picture_request()) return;
           Render so_far = result;
           draw(scene, picture, plane.resolution, so_far);
           job->show(std::move(so_far));
         };
       draw(scene, stretch_picture(scene.field, geometry, scene.bending, settings, plane, progress), plane.resolution,
            result);
-      result.view = view_of(plane);
+      result.view = picture_view(plane);
     }
     result.statistics.seconds_tracing = seconds_since(start);
     return result;
@@ -146,12 +144,8 @@ class StretchMethod : public MethodWith<StretchKeys> {
   const char* name() const override { return "stretch"; }
 
   std::vector<Output> outputs() const override {
-    std::vector<Output> outputs = picture_outputs();
-    outputs.push_back({"stretch", "the stretch in the volume, as a float grid", {".vdb"}, write_grids});
-    return outputs;
+    return picture_outputs({{"stretch", "the stretch in the volume, as a float grid", {".vdb"}, write_grids}});
   }
-
-  std::vector<ChannelText> channels() const override { return channel_texts(stretch_channels()); }
 
   void check(SceneDescription& scene, const Json&, const SceneSource& source, bool chosen) const override {
     if (chosen && scene.bending.rgb && settings().stretch.wavelength)

@@ -24,8 +24,7 @@ struct StretchKeys {
   StretchDescription stretch;
 };
 
-template <class Visitor>
-void describe(StretchDescription& stretch, Visitor& visit) {
+inline void describe(StretchDescription& stretch, KeyVisitor& visit) {
   visit("length", stretch.length,
         "length over which light is followed, world units; default: the volume's depth along the light", above(0));
   visit("wavelength", stretch.wavelength, "wavelength of the light, nm; default: 550, in RGB mode green",
@@ -35,8 +34,7 @@ void describe(StretchDescription& stretch, Visitor& visit) {
         between(1, 32768).as_knob(32, 2048));
 }
 
-template <class Visitor>
-void describe(StretchKeys& keys, Visitor& visit) {
+inline void describe(StretchKeys& keys, KeyVisitor& visit) {
   visit.section("stretch", keys.stretch, "stretch: light and resolution");
 }
 

@@ -168,4 +168,10 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   warn_unused(scene, json, "/light/wavelengths", "/bending/rgb");
 }
 
+const Method& IntegratorDescription::method() const {
+  for (const auto& method : methods)
+    if (method->name() == type.value) return *method;
+  throw std::logic_error("no method is chosen");
+}
+
 }  // namespace tensorray

@@ -1,13 +1,10 @@
 #pragma once
 /// @file scenes/description/material_description.h
-/// A material as a scene file gives it. For visitors see scenes/description/scene_keys.h.
-
-#include <array>
+/// A material as a scene file gives it.
 
 #include <Eigen/Core>
 
-#include "scenes/keys/choice.h"
-#include "scenes/keys/limits.h"
+#include "scenes/keys/key_visitor.h"
 
 namespace tensorray {
 
@@ -23,20 +20,18 @@ struct MaterialDescription {
   double index = 1.5;                                  ///< glass: index of refraction.
 };
 
-inline auto choices(MaterialKind) {
-  using C = Choice<MaterialKind>;
-  return std::array{C{"diffuse", MaterialKind::diffuse}, C{"principled", MaterialKind::principled},
-                    C{"metal", MaterialKind::metal}, C{"glass", MaterialKind::glass}};
+inline Choices<MaterialKind> choices(MaterialKind) {
+  return {{"diffuse", MaterialKind::diffuse},
+          {"principled", MaterialKind::principled},
+          {"metal", MaterialKind::metal},
+          {"glass", MaterialKind::glass}};
 }
 
-inline auto choices(Metal) {
-  using C = Choice<Metal>;
-  return std::array{C{"gold", Metal::gold}, C{"silver", Metal::silver}, C{"copper", Metal::copper},
-                    C{"aluminium", Metal::aluminium}};
+inline Choices<Metal> choices(Metal) {
+  return {{"gold", Metal::gold}, {"silver", Metal::silver}, {"copper", Metal::copper}, {"aluminium", Metal::aluminium}};
 }
 
-template <class Visitor>
-void describe(MaterialDescription& material, Visitor& visit) {
+inline void describe(MaterialDescription& material, KeyVisitor& visit) {
   visit("kind", material.kind, "kind of material");
   visit("color", material.color, "colour of a surface without colours of its own, linear Rec. 709", between(0, 1));
   visit("roughness", material.roughness, "roughness: 0 polished, 1 matt (not diffuse)", between(0, 1));

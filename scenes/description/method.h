@@ -10,10 +10,7 @@
 #include <vector>
 
 #include "base/files/distinct_files.h"
-#include "scenes/keys/json_reader.h"
-#include "scenes/keys/scene_source.h"
-#include "scenes/keys/schema_writer.h"
-#include "scenes/keys/section_reader.h"
+#include "scenes/keys/key_visitor.h"
 
 namespace tensorray {
 
@@ -37,12 +34,6 @@ struct Output {
   const char* option_ending = nullptr;
 };
 
-/// Channels of a picture that belong together.
-struct ChannelText {
-  std::vector<std::string> names;  ///< "normal.X", "normal.Y", "normal.Z"
-  std::string meaning;             ///< What they are, with the unit, as docs/scenes.md says it.
-};
-
 /// A method that has loaded everything that it needs for a scene. Immutable: any number of threads may render with it.
 class LoadedMethod {
  public:
@@ -63,14 +54,10 @@ class Method {
   virtual const char* name() const = 0;
 
   /// Shows the method's keys, which are in `integrator`, to the visitor.
-  virtual void visit(SectionReader& reader) = 0;
-  virtual void visit(SchemaWriter& writer) = 0;
+  virtual void visit(KeyVisitor& visitor) = 0;
 
   /// The kinds of output that the method can write.
   virtual std::vector<Output> outputs() const = 0;
-
-  /// The channels that its EXR can have, as docs/scenes.md lists them for it: without those that are listed elsewhere.
-  virtual std::vector<ChannelText> channels() const = 0;
 
   /// Whether its pictures have noise, which `integrator.max_samples` samples a pixel average.
   virtual bool is_sampled() const { return false; }
@@ -90,7 +77,7 @@ class Method {
   /// Checks the method's keys against each other and against the rest of the scene, and adds to `scene.warnings`.
   /// @param chosen  Whether this is the method that renders the scene.
   /// @throw SceneError through `source`.
-  virtual void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const;
+  virtual void check(SceneDescription&, const Json&, const SceneSource&, bool /*chosen*/) const {}
 
   /// Loads what the method needs in addition to the scene. @param notes  The method adds lines for the user.
   /// @throw The same exceptions as load_scene.
@@ -102,8 +89,7 @@ template <class Settings>
 class MethodWith : public Method {
  public:
   const Settings& settings() const { return settings_; }
-  void visit(SectionReader& reader) override { describe(settings_, reader); }
-  void visit(SchemaWriter& writer) override { describe(settings_, writer); }
+  void visit(KeyVisitor& visitor) override { describe(settings_, visitor); }
 
  private:
   Settings settings_;

@@ -1,16 +1,6 @@
 #pragma once
 /// @file scenes/description/scene_keys.h
-/// The table of all keys of a scene file except those of the methods, which have their own tables. The reader
-/// (section_reader.h) and the schema writer (schema_writer.h) are visitors of the same tables, so that they agree.
-///
-/// A visitor has these functions:
-///   visit(key, member, meaning, limits)           a value;
-///   visit.section(key, keys, meaning)             an object whose keys `describe(keys, inner)` visits;
-///   visit.list(key, vector, meaning, keys_of)     a list of such objects, `keys_of(item)` each;
-///   visit.generator(key, member, meaning)         an object whose keys depend on its `kind`;
-///   visit.part(part)                              more keys of this object, which `part` describes;
-///   visit.only_for(keys, chooser, value, values)  keys that are allowed only if another key has one of some values;
-///   visit.require(keys), visit.exactly_one(keys), visit.exclude(key, keys)    rules for several keys of one object.
+/// The table of all keys of a scene file except those of the methods, which have their own tables.
 
 #include <filesystem>
 #include <string>
@@ -26,8 +16,7 @@ namespace tensorray {
 /// The largest integer that every JSON reader keeps exactly: 2^53.
 constexpr double largest_exact_integer = 9007199254740992.0;
 
-template <class Visitor>
-void describe(ComponentGrids& grids, Visitor& visit) {
+inline void describe(ComponentGrids& grids, KeyVisitor& visit) {
   constexpr const char* entries[] = {"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"};
   constexpr const char* axes[] = {"x", "y", "z"};
   for (std::size_t i = 0; i < 9; ++i)
@@ -36,8 +25,7 @@ void describe(ComponentGrids& grids, Visitor& visit) {
     visit(axes[i], grids.vector[i], "name of the scalar grid that is this component of the vector to derive");
 }
 
-template <class Visitor>
-void describe(FieldDescription& field, Visitor& visit) {
+inline void describe(FieldDescription& field, KeyVisitor& visit) {
   visit.exactly_one({"file", "generate"});
   visit("file", field.file, "OpenVDB file with the tensor field");
   visit("name", field.name, "name of the field in the file; not needed if there is only one");
@@ -62,8 +50,7 @@ void describe(FieldDescription& field, Visitor& visit) {
   visit("bounds", field.bounds, "closed mesh that limits the volume; light is straight outside it");
 }
 
-template <class Visitor>
-void describe(BendingDescription& bending, Visitor& visit) {
+inline void describe(BendingDescription& bending, KeyVisitor& visit) {
   visit("a", bending.flexibility.a, "constant part of the flexibility of light, s = a + b * wavelength", knob(-2, 2));
   visit("b", bending.flexibility.b, "slope of the flexibility of light, s = a + b * wavelength, per nm",
         knob(-0.004, 0.004));
@@ -78,8 +65,7 @@ void describe(BendingDescription& bending, Visitor& visit) {
   visit("max_steps", bending.settings.max_steps, "number of steps after which a ray is given up", between(1, 1e9));
 }
 
-template <class Visitor>
-void describe(ApertureDescription& aperture, Visitor& visit) {
+inline void describe(ApertureDescription& aperture, KeyVisitor& visit) {
   visit("center", aperture.center, "middle of the aperture, world; default: that of the volume's silhouette");
   visit("size", aperture.size, "width and height, world units", above(0));
 }
@@ -89,8 +75,7 @@ struct WavelengthKeys {
   LightDescription& light;
 };
 
-template <class Visitor>
-void describe(WavelengthKeys& keys, Visitor& visit) {
+inline void describe(WavelengthKeys& keys, KeyVisitor& visit) {
   LightDescription& light = keys.light;
   visit("min", light.wavelength_min, "shortest wavelength, nm", between(observer_min, observer_max).as_knob());
   visit("max", light.wavelength_max, "longest wavelength, nm", between(observer_min, observer_max).as_knob());
@@ -99,8 +84,7 @@ void describe(WavelengthKeys& keys, Visitor& visit) {
         between(1, 1000).or_word("all"));
 }
 
-template <class Visitor>
-void describe(LightDescription& light, Visitor& visit) {
+inline void describe(LightDescription& light, KeyVisitor& visit) {
   visit("direction", light.direction,
         "direction in which light travels, of any length; auto: of the six axis directions, the one in which light "
         "shows most of the field",
@@ -116,8 +100,7 @@ void describe(LightDescription& light, Visitor& visit) {
   visit.section("aperture", light.aperture, "a rectangle that light comes from, instead of the volume's silhouette");
 }
 
-template <class Visitor>
-void describe(ReceiverDescription& receiver, Visitor& visit) {
+inline void describe(ReceiverDescription& receiver, KeyVisitor& visit) {
   visit.exclude("center", {"distance"});
   visit("distance", receiver.distance,
         "distance of the plate behind the volume, along the light; default: 1/4 of its depth", at_least(0).as_knob());
@@ -130,8 +113,7 @@ void describe(ReceiverDescription& receiver, Visitor& visit) {
         between(1, 32768).or_one_for_all());
 }
 
-template <class Visitor>
-void describe(CameraDescription& camera, Visitor& visit) {
+inline void describe(CameraDescription& camera, KeyVisitor& visit) {
   visit.exclude("position", {"direction"});
   visit("projection", camera.projection, "perspective or orthographic");
   visit("position", camera.position, "position of the camera, world; default: everything is visible");
@@ -145,8 +127,7 @@ void describe(CameraDescription& camera, Visitor& visit) {
   visit("resolution", camera.resolution, "pixels, width and height", between(1, 32768).or_one_for_all());
 }
 
-template <class Visitor>
-void describe(LightSourceDescription& light, Visitor& visit) {
+inline void describe(LightSourceDescription& light, KeyVisitor& visit) {
   visit.require({"kind"});
   visit("kind", light.kind, "kind of light");
   visit("color", light.color, "colour, linear Rec. 709; environment: a factor", at_least(0));
@@ -172,8 +153,7 @@ void describe(LightSourceDescription& light, Visitor& visit) {
   visit.only_for({"file", "layer", "rotation"}, "kind", light.kind, {LightKind::environment});
 }
 
-template <class Visitor>
-void describe(PlateDescription& plate, Visitor& visit) {
+inline void describe(PlateDescription& plate, KeyVisitor& visit) {
   visit.require({"center"});
   visit("center", plate.center, "middle of the plate, world");
   visit("normal", plate.normal, "normal of the plate", not_zero());
@@ -181,13 +161,11 @@ void describe(PlateDescription& plate, Visitor& visit) {
   visit("size", plate.size, "width and height, world units", above(0));
 }
 
-template <class Visitor>
-void describe(PathsDescription& paths, Visitor& visit) {
+inline void describe(PathsDescription& paths, KeyVisitor& visit) {
   visit("count", paths.count, "number of seeds; default: that of integrator.seeds", between(1, 1e6));
 }
 
-template <class Visitor>
-void describe(ObjectDescription& object, Visitor& visit) {
+inline void describe(ObjectDescription& object, KeyVisitor& visit) {
   visit.exactly_one({"plate", "file", "paths"});
   visit.section("plate", object.plate, "a flat rectangle");
   visit("file", object.file, "a mesh");
@@ -202,15 +180,13 @@ void describe(ObjectDescription& object, Visitor& visit) {
   visit.section("material", object.material, "material; the brighter squares of a checkerboard have its colour");
 }
 
-template <class Visitor>
-void describe(IntegratorDescription& integrator, Visitor& visit) {
+inline void describe(IntegratorDescription& integrator, KeyVisitor& visit) {
   visit.require({"type"});
   visit("type", integrator.type, "the method", knob());
-  for (const auto& method : integrator.methods) visit.part(*method);
+  for (const auto& method : integrator.methods) method->visit(visit);
 }
 
-template <class Visitor>
-void describe(OutputDescription& output, Visitor& visit) {
+inline void describe(OutputDescription& output, KeyVisitor& visit) {
   for (const Output& kind : output.kinds) {
     std::filesystem::path file;
     visit(kind.key, file, kind.meaning, endings(kind.endings));
@@ -233,14 +209,12 @@ struct ObstacleKeys {
   std::filesystem::path& file;
 };
 
-template <class Visitor>
-void describe(ObstacleKeys& keys, Visitor& visit) {
+inline void describe(ObstacleKeys& keys, KeyVisitor& visit) {
   visit.require({"file"});
   visit("file", keys.file, "mesh that absorbs light");
 }
 
-template <class Visitor>
-void describe(SceneDescription& scene, Visitor& visit) {
+inline void describe(SceneDescription& scene, KeyVisitor& visit) {
   visit.require({"field", "integrator"});
   std::string schema;  // Only editors use it.
   visit("$schema", schema, "path of this schema, for editors");

@@ -1,25 +1,15 @@
 #include "scenes/description/spectrum_description.h"
 
 #include <algorithm>
-#include <charconv>
 #include <vector>
 
+#include "base/text/parse_number.h"
 #include "base/text/text.h"
 
 namespace tensorray {
 namespace {
 
 const std::string blackbody_word = "blackbody";
-
-/// Reads the whole `text`, except blanks at its ends, as a number. Returns false if it is not a number.
-bool read_decimal(std::string text, double& number) {
-  const std::size_t first = text.find_first_not_of(' ');
-  if (first == std::string::npos) return false;
-  text = text.substr(first, text.find_last_not_of(' ') + 1 - first);
-  const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, number);
-  return error == std::errc() && rest == end;
-}
 
 }  // namespace
 
@@ -32,8 +22,9 @@ bool Value<SpectrumDescription>::read(const Json& json, const Limits& limits, Sp
     return true;
   }
   if (text == blackbody_word || starts_with(text, blackbody_word + " ")) {
-    BlackBody& body = target.emplace<BlackBody>();
-    return read_decimal(text.substr(blackbody_word.size()), body.kelvin) && body.kelvin >= 100 && body.kelvin <= 1e9;
+    const double kelvin = parse_number(trimmed(text.substr(blackbody_word.size()))).value_or(0);
+    target = BlackBody{kelvin};
+    return kelvin >= 100 && kelvin <= 1e9;
   }
   return names_file(text) && Value<std::filesystem::path>::read(json, limits, target.emplace<std::filesystem::path>());
 }

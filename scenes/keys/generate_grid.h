@@ -28,7 +28,7 @@ struct GridRequest {
 constexpr int resolution_limit = 32768;       ///< Voxels along an axis.
 constexpr double voxel_limit = 2147483648.0;  ///< Voxels of a generated grid: 72 GiB of tensors.
 
-/// The keys of the grid; the generator has further keys. For visitors see scenes/description/scene_keys.h.
+/// The keys of the grid; the generator has further keys.
 template <class Visitor>
 void describe(GridRequest& grid, Visitor& visit) {
   visit("resolution", grid.resolution,

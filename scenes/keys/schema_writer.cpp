@@ -3,9 +3,46 @@
 #include <algorithm>
 #include <variant>
 
+#include "scenes/keys/generate_grid.h"
+
 namespace tensorray {
 
-void SchemaWriter::generator(const char* key, const std::optional<GenerateDescription>&, const char* meaning) {
+void SchemaWriter::value(const char* key, KeyMember& member, const char* meaning, const Limits& limits) {
+  Json schema = {{"description", meaning}};
+  const Json value = member.schema(limits);
+  if (limits.word)
+    schema["anyOf"] = {value, {{"const", limits.word}}};
+  else
+    schema.update(value);
+  const Json standard = limits.word && member.is_word() ? Json(limits.word) : member.json();
+  const bool is_required = std::find(required_.begin(), required_.end(), key) != required_.end();
+  if (!standard.is_null() && !is_required) schema["default"] = standard;
+  if (!limits.examples.empty()) schema["examples"] = limits.examples;
+  if (limits.is_knob) schema["knob"] = limits.from < limits.to ? Json{limits.from, limits.to} : Json(true);
+  properties_[key] = schema;
+}
+
+void SchemaWriter::object(const char* key, const char* meaning, const Describe& describe_keys) {
+  SchemaWriter inner;
+  describe_keys(inner);
+  properties_[key] = inner.finish(meaning);
+}
+
+void SchemaWriter::objects(const char* key, const char* meaning, const Describe& describe_next) {
+  SchemaWriter inner;
+  describe_next(inner);
+  properties_[key] = {{"description", meaning}, {"type", "array"}, {"items", inner.finish("")}};
+}
+
+void SchemaWriter::only_where(std::initializer_list<const char*> keys, const char* chooser, const std::string& word,
+                              const std::vector<std::string>& words) {
+  Json chosen = {{"properties", {{chooser, {{"enum", words}}}}}};
+  const bool is_default = std::find(words.begin(), words.end(), word) != words.end();
+  if (!is_default) chosen["required"] = {chooser};
+  for (const char* key : keys) rules_.push_back({{"anyOf", {chosen, {{"not", {{"required", {key}}}}}}}});
+}
+
+void SchemaWriter::generator(const char* key, std::optional<GenerateDescription>& /*member*/, const char* meaning) {
   Json kinds = Json::array();
   for (const std::string& kind : generator_kinds()) {
     SchemaWriter inner;
@@ -42,10 +79,6 @@ Json SchemaWriter::finish(const std::string& meaning) const {
   if (!alternatives_.empty()) schema["oneOf"] = alternatives_;
   if (!rules_.empty()) schema["allOf"] = rules_;
   return schema;
-}
-
-bool SchemaWriter::is_required(const std::string& key) const {
-  return std::find(required_.begin(), required_.end(), key) != required_.end();
 }
 
 }  // namespace tensorray

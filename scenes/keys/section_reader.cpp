@@ -6,6 +6,10 @@
 #include <utility>
 #include <variant>
 
+#include <fmt/core.h>
+
+#include "scenes/keys/generate_grid.h"
+
 namespace tensorray {
 namespace {
 
@@ -79,6 +83,45 @@ void SectionReader::refuse(const std::string& key, const std::string& expected, 
   const std::string alternative = word ? fmt::format(", or \"{}\"", word) : "";
   source_.fail(
       fmt::format("`{}` must be {}{}, but is {}", pointer_to(key), expected, alternative, excerpt(object_.at(key))));
+}
+
+void SectionReader::value(const char* key, KeyMember& member, const char* /*meaning*/, const Limits& limits) {
+  const Json* value = find(key);
+  if (!value) return;
+  if (limits.word && *value == limits.word)
+    member.set_word();
+  else if (!member.read(*value, limits))
+    refuse(key, member.expectation(limits), limits.word);
+  member.resolve(source_);
+}
+
+void SectionReader::object(const char* key, const char* /*meaning*/, const Describe& describe_keys) {
+  if (const Json* value = find(key)) read_object(*value, key, describe_keys);
+}
+
+void SectionReader::objects(const char* key, const char* /*meaning*/, const Describe& describe_next) {
+  const Json* value = find(key);
+  if (!value) return;
+  if (!value->is_array()) refuse(key, "a list of objects");
+  const SectionReader items(*value, pointer_to(key), source_);
+  for (std::size_t i = 0; i < value->size(); ++i) items.read_object((*value)[i], std::to_string(i), describe_next);
+}
+
+void SectionReader::read_object(const Json& value, const std::string& key, const Describe& describe_keys) const {
+  if (!value.is_object())
+    source_.fail(fmt::format("`{}` must be an object, but is {}", pointer_to(key), excerpt(value)));
+  SectionReader inner(value, pointer_to(key), source_);
+  describe_keys(inner);
+  inner.finish();
+}
+
+void SectionReader::only_where(std::initializer_list<const char*> keys, const char* chooser, const std::string& word,
+                               const std::vector<std::string>& words) {
+  if (std::find(words.begin(), words.end(), word) != words.end()) return;
+  std::string allowed;
+  for (const std::string& each : words) allowed += fmt::format("{}\"{}\"", allowed.empty() ? "" : " or ", each);
+  for (const char* key : keys)
+    if (object_.contains(key)) strays_.push_back({key, chooser, word, allowed});
 }
 
 void SectionReader::generator(const char* key, std::optional<GenerateDescription>& member, const char* /*meaning*/) {

@@ -16,16 +16,6 @@ bool within(double number, const Limits& limits) {
   return above && number <= limits.maximum;
 }
 
-/// Integers may be written as 1e6 or 4.0, as JSON Schema allows. All limits of integers are exact in a double.
-template <class Integer>
-bool read_integer(const Json& json, const Limits& limits, Integer& target) {
-  if (!json.is_number()) return false;
-  const double number = json.get<double>();
-  if (number != std::floor(number) || !within(number, limits)) return false;
-  target = json.is_number_float() ? static_cast<Integer>(number) : json.get<Integer>();
-  return true;
-}
-
 std::string range(const Limits& limits) {
   if (limits.not_zero) return " other than 0";
   if (std::isfinite(limits.maximum)) return fmt::format(" from {} to {}", limits.minimum, limits.maximum);
@@ -82,26 +72,13 @@ Json Value<bool>::json(const bool& value) { return value; }
 
 // Integers
 
-bool Value<int>::read(const Json& json, const Limits& limits, int& target) {
-  return read_integer(json, limits, target);
-}
-std::string Value<int>::expectation(const int&, const Limits& limits) { return "an integer" + range(limits); }
-Json Value<int>::schema(const int&, const Limits& limits) { return number_schema<std::int64_t>("integer", limits); }
-Json Value<int>::json(const int& value) { return value; }
-
-bool Value<std::uint64_t>::read(const Json& json, const Limits& limits, std::uint64_t& target) {
-  return read_integer(json, limits, target);
+bool is_integer(const Json& json, const Limits& limits) {
+  const double number = json.is_number() ? json.get<double>() : NAN;
+  return number == std::floor(number) && within(number, limits);
 }
 
-std::string Value<std::uint64_t>::expectation(const std::uint64_t&, const Limits& limits) {
-  return "an integer" + range(limits);
-}
-
-Json Value<std::uint64_t>::schema(const std::uint64_t&, const Limits& limits) {
-  return number_schema<std::int64_t>("integer", limits);
-}
-
-Json Value<std::uint64_t>::json(const std::uint64_t& value) { return value; }
+std::string integer_expectation(const Limits& limits) { return "an integer" + range(limits); }
+Json integer_schema(const Limits& limits) { return number_schema<std::int64_t>("integer", limits); }
 
 // Numbers
 

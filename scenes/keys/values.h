@@ -14,11 +14,29 @@
 #include <Eigen/Core>
 #include <fmt/core.h>
 
-#include "scenes/keys/choice.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/keys/limits.h"
 
 namespace tensorray {
+
+/// Names in scene files for the values of an enumeration. `choices(Enum{})` returns all values and their names; its
+/// argument only selects the overload.
+template <class Enum>
+struct Choice {
+  const char* name;
+  Enum value;
+};
+
+template <class Enum>
+using Choices = std::vector<Choice<Enum>>;
+
+/// The name of a value.
+template <class Enum>
+const char* choice_name(Enum value) {
+  for (const auto& choice : choices(value))
+    if (choice.value == value) return choice.name;
+  return "";
+}
 
 /// A type that may be the value of a key has a specialisation `Value<T>` with four static functions:
 ///   bool read(json, limits, target)       sets `target`; returns false if the JSON value has another type or breaks a
@@ -47,8 +65,6 @@ struct Word {
   }
 
 TENSORRAY_VALUE(bool);
-TENSORRAY_VALUE(int);
-TENSORRAY_VALUE(std::uint64_t);
 TENSORRAY_VALUE(double);
 TENSORRAY_VALUE(std::string);
 TENSORRAY_VALUE(std::filesystem::path);
@@ -57,6 +73,23 @@ TENSORRAY_VALUE(Eigen::Matrix3d);      ///< A list of rows.
 TENSORRAY_VALUE(std::vector<double>);  ///< A list, or one number.
 using IntegerOrThree = std::variant<int, Eigen::Vector3i>;
 TENSORRAY_VALUE(IntegerOrThree);
+
+/// Of integers. They may be written as 1e6 or 4.0, as JSON Schema allows; their limits are exact in a double.
+bool is_integer(const Json& json, const Limits& limits);
+std::string integer_expectation(const Limits& limits);
+Json integer_schema(const Limits& limits);
+
+template <class Integer>
+struct Value<Integer, std::enable_if_t<std::is_integral_v<Integer> && !std::is_same_v<Integer, bool>>> {
+  static bool read(const Json& json, const Limits& limits, Integer& target) {
+    if (!is_integer(json, limits)) return false;
+    target = json.is_number_float() ? static_cast<Integer>(json.get<double>()) : json.get<Integer>();
+    return true;
+  }
+  static std::string expectation(const Integer&, const Limits& limits) { return integer_expectation(limits); }
+  static Json schema(const Integer&, const Limits& limits) { return integer_schema(limits); }
+  static Json json(const Integer& value) { return value; }
+};
 
 /// Value::expectation of a list: "a list of 3 numbers >= 0".
 std::string list_expectation(int size, const char* things, const Limits& limits);

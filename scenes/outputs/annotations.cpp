@@ -4,13 +4,18 @@
 #include <cstddef>
 #include <vector>
 
+#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "renderer/charts/annotations.h"
-#include "scenes/outputs/wavelength_color.h"
+#include "renderer/color/color.h"
+#include "renderer/spectra/spectrum.h"
 
 namespace tensorray {
 namespace {
+
+constexpr double unseen = 0.5;  // Grey of wavelengths that the eye does not see.
+constexpr double pale = 0.03;   // Part of white in the colour of a wavelength, which makes it reproducible.
 
 ColorStrip wavelength_strip(const Scene& scene) {
   const double min = scene.description.light.wavelength_min, max = scene.description.light.wavelength_max;
@@ -42,9 +47,9 @@ ColorStrip rgb_strip(const Scene& scene) {
 
 }  // namespace
 
-PictureView view_of(const Plate& plate) { return {plate.right, plate.up, plate.pixel_size().x()}; }
+PictureView picture_view(const Plate& plate) { return {plate.right, plate.up, plate.pixel_size().x()}; }
 
-PictureView view_of(const Camera& camera) {
+PictureView picture_view(const Camera& camera) {
   PictureView view{camera.right, camera.up, {}};
   if (camera.projection == Projection::orthographic) view.pixel_size = camera.height / camera.resolution.y();
   return view;
@@ -64,6 +69,14 @@ void draw_annotations(const OutputDescription& output, const Render& render, Ima
   if (!render.view) return;
   if (output.wants(Annotation::scale) && render.view->pixel_size) draw_scale_bar(image, *render.view->pixel_size);
   if (output.wants(Annotation::axes)) draw_axes(image, render.view->right, render.view->up);
+}
+
+Eigen::Vector3d wavelength_color(double wavelength) {
+  Eigen::Vector3d rgb = rec709_to_xyz().inverse() * observer(wavelength);
+  rgb.array() -= std::min(0.0, rgb.minCoeff());
+  const double greatest = rgb.maxCoeff();
+  if (!(greatest > 0)) return Eigen::Vector3d::Constant(unseen);
+  return rgb / greatest * (1 - pale) + Eigen::Vector3d::Constant(pale);
 }
 
 }  // namespace tensorray

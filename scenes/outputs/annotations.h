@@ -13,10 +13,10 @@
 namespace tensorray {
 
 /// The view of a picture whose pixels are those of a plate.
-PictureView view_of(const Plate& plate);
+PictureView picture_view(const Plate& plate);
 
 /// The view of a picture of a camera.
-PictureView view_of(const Camera& camera);
+PictureView picture_view(const Camera& camera);
 
 /// A legend of the light of a scene, for Render::draw_legend: its wavelengths (in RGB mode, its flexibilities) and the
 /// exposure.
@@ -24,5 +24,9 @@ std::function<void(Image&, double exposure)> light_legend(const Scene& scene);
 
 /// Draws the caption, the scale bar and the axes that `output` asks for, if the picture has them.
 void draw_annotations(const OutputDescription& output, const Render& render, Image& image);
+
+/// The colour of light of one wavelength (nm) for the eye, linear Rec. 709, as saturated as a display can show it; grey
+/// if the eye does not see it.
+Eigen::Vector3d wavelength_color(double wavelength);
 
 }  // namespace tensorray

@@ -43,9 +43,12 @@ void write_spectral(const std::filesystem::path& file, const Scene& scene, const
 
 }  // namespace
 
-std::vector<Output> picture_outputs() {
-  return {{"image", "display-referred picture", {".png", ".jpg", ".jpeg", ".tif", ".tiff"}, write_display},
-          {"exr", "scene-linear picture", {".exr"}, write_linear}};
+std::vector<Output> picture_outputs(const std::vector<Output>& more) {
+  std::vector<Output> outputs{
+      {"image", "display-referred picture", {".png", ".jpg", ".jpeg", ".tif", ".tiff"}, write_display},
+      {"exr", "scene-linear picture", {".exr"}, write_linear}};
+  outputs.insert(outputs.end(), more.begin(), more.end());
+  return outputs;
 }
 
 Output spectral_output() {

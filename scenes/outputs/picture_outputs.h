@@ -12,8 +12,8 @@
 
 namespace tensorray {
 
-/// "image" and "exr".
-std::vector<Output> picture_outputs();
+/// "image" and "exr", and more.
+std::vector<Output> picture_outputs(const std::vector<Output>& more = {});
 
 /// "spectral", for methods whose light has bands.
 Output spectral_output();

@@ -84,6 +84,9 @@ struct RenderJob : Job {
 
   /// Gets what there is so far when a picture is wanted; may be empty.
   std::function<void(Render)> show;
+
+  /// Whether it is wanted now, and is not any more then. Only the root asks.
+  bool takes_picture_request() { return show && is_root(ranks) && picture_wanted.exchange(false); }
 };
 
 /// Renders the scene with its method. @param job  Null: nothing is kept. Of ranks, only the root has the result; a

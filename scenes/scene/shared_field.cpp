@@ -12,51 +12,48 @@
 #include <sys/stat.h>
 
 #include "base/files/shared_file.h"
+#include "base/process/archive.h"
 #include "base/text/content_hash.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
 
-/// What ends a file, for processes of the same program. Before it are, from the end to the beginning: notes,
-/// `strongest` and the places of all bricks, what is unused, and bricks.
-struct FileEnding {
-  std::array<double, 16> to_world;
-  std::array<int, 6> voxels;
-  Interpolant interpolant;
-  double max_norm;
-  std::size_t bricks, stride;
-  int components;
+/// What a process needs of a file besides the field's bricks, which are at its beginning.
+struct FieldRest {
+  FieldParts parts;
+  std::size_t stride = 0;
+  int components = 0;
   EigenvalueReport eigenvalues;
-  std::size_t non_finite, notes;  ///< `notes`: their bytes.
-  std::array<char, 16> mark;
+  std::size_t non_finite = 0;
+  std::vector<std::string> notes;
+
+  void copy(Archive& archive) {
+    archive.copy(parts.interpolant);
+    archive.copy(parts.to_world.data(), 16 * sizeof(double));
+    archive.copy(parts.voxels.min());
+    archive.copy(parts.voxels.max());
+    archive.copy(parts.max_norm);
+    archive.copy_list(parts.bricks);
+    archive.copy_list(parts.strongest);
+    archive.copy(stride);
+    archive.copy(components);
+    archive.copy(eigenvalues);
+    archive.copy(non_finite);
+    std::size_t count = notes.size();
+    archive.copy(count);
+    notes.resize(count);
+    for (std::string& note : notes) archive.copy_list(note);
+  }
+};
+
+/// The end of the file.
+struct FieldEnd {
+  std::uint64_t rest = 0;  ///< Bytes of FieldRest, which are before it.
+  std::array<char, 16> mark{};
 };
 
 constexpr std::array<char, 16> field_mark{"tensorray field"};
-
-FileEnding ending_of(const LoadedField& loaded, std::size_t notes) {
-  const TensorField& field = loaded.field;
-  FileEnding ending{};
-  std::copy_n(field.to_world().data(), 16, ending.to_world.begin());
-  const Eigen::AlignedBox3i voxels = field.voxels().cast<int>();
-  std::copy_n(voxels.min().data(), 3, ending.voxels.begin());
-  std::copy_n(voxels.max().data(), 3, ending.voxels.begin() + 3);
-  ending.interpolant = field.interpolant();
-  ending.max_norm = field.max_norm();
-  ending.bricks = field.memory().count;
-  ending.stride = field.memory().stride;
-  ending.components = field.memory().components;
-  ending.eigenvalues = loaded.eigenvalues;
-  ending.non_finite = loaded.non_finite;
-  ending.notes = notes;
-  ending.mark = field_mark;
-  return ending;
-}
-
-template <class T>
-std::string_view raw_bytes(const std::vector<T>& values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
-}
 
 std::uint64_t size_of(const Descriptor& file) {
   struct stat status {};
@@ -66,49 +63,44 @@ std::uint64_t size_of(const Descriptor& file) {
 /// Writes to the file of a field's bricks what else another process needs. @return false if there is no such file, or
 /// the disk has no space for it.
 bool complete_file(const LoadedField& loaded) {
-  const BrickMemory& memory = loaded.field.memory();
+  const TensorField& field = loaded.field;
+  const BrickMemory& memory = field.memory();
   if (!memory.file) return false;
-  std::vector<float> strongest;
-  for (const Eigen::Vector3i& brick : loaded.field.bricks()) strongest.push_back(loaded.field.brick(brick).strongest);
-  std::string notes;
-  for (const std::string& note : loaded.notes) notes += note + '\0';
-  const FileEnding ending = ending_of(loaded, notes.size());
-  std::uint64_t at = size_of(*memory.file);
-  for (const std::string_view bytes : {raw_bytes(loaded.field.bricks()), raw_bytes(strongest), std::string_view(notes),
-                                       std::string_view(reinterpret_cast<const char*>(&ending), sizeof ending)}) {
-    if (!write_whole_at(memory.file->get(), bytes, at)) return false;
-    at += bytes.size();
-  }
-  return true;
+  FieldRest rest;
+  rest.parts.interpolant = field.interpolant();
+  rest.parts.to_world = field.to_world();
+  rest.parts.voxels = field.voxels().cast<int>();
+  rest.parts.max_norm = field.max_norm();
+  rest.parts.bricks = field.bricks();
+  for (const Eigen::Vector3i& brick : field.bricks()) rest.parts.strongest.push_back(field.brick(brick).strongest);
+  rest.stride = memory.stride;
+  rest.components = memory.components;
+  rest.eigenvalues = loaded.eigenvalues;
+  rest.non_finite = loaded.non_finite;
+  rest.notes = loaded.notes;
+  Archive archive;
+  rest.copy(archive);
+  std::string bytes = archive.take();
+  const FieldEnd end{bytes.size(), field_mark};
+  bytes.append(reinterpret_cast<const char*>(&end), sizeof end);
+  return write_whole_at(memory.file->get(), bytes, size_of(*memory.file));
 }
 
 /// The field of a file, with its bricks where they are; nothing if the file is not complete.
 std::optional<LoadedField> field_of_file(Descriptor file) {
-  std::uint64_t at = size_of(file);
-  const auto read_before = [&](void* bytes, std::size_t count) {
-    return count <= at && read_whole_at(file.get(), bytes, count, at -= count);
-  };
-  FileEnding ending{};
-  if (!read_before(&ending, sizeof ending) || ending.mark != field_mark) return {};
-  FieldParts parts;
-  std::copy_n(ending.to_world.begin(), 16, parts.to_world.data());
-  std::copy_n(ending.voxels.begin(), 3, parts.voxels.min().data());
-  std::copy_n(ending.voxels.begin() + 3, 3, parts.voxels.max().data());
-  parts.interpolant = ending.interpolant;
-  parts.max_norm = ending.max_norm;
-  std::string notes(ending.notes, '\0');
-  parts.strongest.resize(ending.bricks);
-  parts.bricks.resize(ending.bricks);
-  if (!read_before(notes.data(), notes.size()) ||
-      !read_before(parts.strongest.data(), raw_bytes(parts.strongest).size()) ||
-      !read_before(parts.bricks.data(), raw_bytes(parts.bricks).size()))
+  const std::uint64_t size = size_of(file);
+  FieldEnd end;
+  if (size < sizeof end || !read_whole_at(file.get(), &end, sizeof end, size - sizeof end) || end.mark != field_mark ||
+      end.rest > size - sizeof end)
     return {};
-  parts.memory = bricks_of_file(std::move(file), ending.bricks, ending.stride, ending.components);
-  LoadedField loaded{TensorField(std::move(parts)), ending.eigenvalues, ending.non_finite, {}};
-  for (std::size_t first = 0; first < notes.size(); first += loaded.notes.back().size() + 1)
-    loaded.notes.emplace_back(notes.c_str() + first);
-  loaded.notes.emplace_back("the field is that of another process, which has loaded it");
-  return loaded;
+  std::string bytes(end.rest, '\0');
+  if (!read_whole_at(file.get(), bytes.data(), bytes.size(), size - sizeof end - bytes.size())) return {};
+  Archive archive(bytes);
+  FieldRest rest;
+  rest.copy(archive);
+  rest.parts.memory = bricks_of_file(std::move(file), rest.parts.bricks.size(), rest.stride, rest.components);
+  rest.notes.emplace_back("the field is that of another process, which has loaded it");
+  return LoadedField{TensorField(std::move(rest.parts)), rest.eigenvalues, rest.non_finite, std::move(rest.notes)};
 }
 
 }  // namespace

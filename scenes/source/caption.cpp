@@ -1,8 +1,8 @@
-#include "scenes/source/caption.h"
-
 #include <algorithm>
 
 #include <fmt/format.h>
+
+#include "scenes/source/overrides.h"
 
 namespace tensorray {
 namespace {

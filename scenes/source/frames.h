@@ -30,4 +30,8 @@ void set_frame(Json& scene, int frame, const SceneSource& source);
 /// @throw SceneError, with the place, if the scene has keyframes.
 void refuse_keyframes(const Json& scene, const SceneSource& source);
 
+/// Lets keyframes take the place of every number, and of every list of numbers, of a schema. Their form is added to it
+/// as `$defs/keyframes`.
+void allow_keyframes(Json& schema);
+
 }  // namespace tensorray

@@ -1,4 +1,4 @@
-#include "scenes/source/keyframe_schema.h"
+#include "scenes/source/frames.h"
 
 #include <algorithm>
 

@@ -1,10 +1,11 @@
 #pragma once
 /// @file scenes/source/overrides.h
-/// Applies changes to a scene from the command line.
+/// Keys by their names, as "light.photons": changes to a scene from the command line, and values in captions.
 
 #include <string>
 
 #include "scenes/keys/json_reader.h"
+#include "scenes/keys/scene_source.h"
 
 namespace tensorray {
 
@@ -13,5 +14,10 @@ namespace tensorray {
 /// @throw SceneError: the text does not have that form, KEY leads through a value that is neither object nor list, or
 /// an index is out of range.
 void apply_override(Json& scene, const std::string& text);
+
+/// Replaces each {field.scale} by the value of this key at the scene's frame: numbers with four digits, lists with
+/// commas. Keys are named as by --set.
+/// @throw SceneError if the scene does not give such a key, or a brace has no partner.
+std::string with_values(const std::string& caption, const Json& scene, const SceneSource& source);
 
 }  // namespace tensorray

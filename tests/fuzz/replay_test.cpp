@@ -40,13 +40,5 @@ TEST_P(Replay, NoBytesBreakAParserWhichAcceptsSomeOfThem) {
 INSTANTIATE_TEST_SUITE_P(Targets, Replay, ::testing::Range(std::size_t{0}, fuzz_targets().size()),
                          [](const auto& test) { return std::string(fuzz_targets()[test.param].name); });
 
-/// A folder that belongs to no target is replayed by none.
-TEST(FuzzCorpus, BelongsToTargets) {
-  std::set<std::string> names;
-  for (const FuzzTarget& target : fuzz_targets()) names.insert(target.name);
-  for (const auto& entry : std::filesystem::directory_iterator(corpus()))
-    EXPECT_EQ(names.count(entry.path().filename().string()), 1u) << entry.path();
-}
-
 }  // namespace
 }  // namespace tensorray::test

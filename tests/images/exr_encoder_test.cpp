@@ -49,24 +49,6 @@ TEST(ExrEncoderTest, PicturesAreReadBackBitForBit) {
     }
 }
 
-TEST(ExrEncoderTest, MetadataIsText) {
-  const std::string file = file_of(picture(2, 2, {"R", "G", "B"}), {{"ImageDescription", "a\nb"},
-                                                                    {"Copyright", "all"},
-                                                                    {"Software", "tensorray 9.9"},
-                                                                    {"spectralLayoutVersion", "1.0"},
-                                                                    {"tensorray:done", "0.5000"},
-                                                                    {"empty", ""},
-                                                                    {std::string(40, 'x'), "long"}});
-  for (const auto& [name, text] : {std::pair<std::string, std::string>("comments", "a\nb"),
-                                   {"owner", "all"},
-                                   {"Software", "tensorray 9.9"},
-                                   {"spectralLayoutVersion", "1.0"},
-                                   {"tensorray:done", "0.5000"},
-                                   {"empty", ""},
-                                   {std::string(40, 'x'), "long"}})
-    EXPECT_THAT(file, HasSubstr(exr_attribute(name, "string", text)));
-}
-
 TEST(ExrEncoderTest, MetadataThatTheFormatHasNoPlaceForIsLeftOut) {
   const Image image = picture(2, 2, {"R", "G", "B"});
   const std::string plain = file_of(image);

@@ -14,22 +14,6 @@ Film counting_film(int width, int height, int channels) {
   return film;
 }
 
-TEST(LinearImageTest, UndisturbedLightHasTheColorOfItsIlluminant) {
-  const Spectrum light = illuminant("D65");
-  for (const int count : {1, 5, 32}) {
-    Film film(3, 2, count);
-    film.values.assign(film.values.size(), 1);
-    const std::vector<Band> bands = make_bands(light, observer_min, observer_max, count);
-    const Image image = linear_image(film, bands, Eigen::Matrix3d::Identity());
-    EXPECT_EQ(image.channels, (std::vector<std::string>{"R", "G", "B"}));
-    for (int x = 0; x < 3; ++x) {
-      EXPECT_NEAR(image.pixel(x, 1)[0], 0.9505, 1e-3);
-      EXPECT_NEAR(image.pixel(x, 1)[1], 1, 1e-6);
-      EXPECT_NEAR(image.pixel(x, 1)[2], 1.0891, 1e-3);
-    }
-  }
-}
-
 TEST(LinearImageTest, EqualsTheSumOverBands) {
   const Film film = counting_film(4, 3, 2);
   std::vector<Band> bands(2);
@@ -81,13 +65,6 @@ TEST(SpectralImageTest, NamesHaveSixDecimalsInEveryLocale) {
   EXPECT_EQ(image.channels[3], "S0.380,000000nm") << (changed ? changed : "C");
   EXPECT_EQ(image.channels[4], "S0.333,333333nm");
   EXPECT_EQ(image.channels[5], "S0.1250,000000nm");
-}
-
-TEST(SpectralImageTest, FilmAndBandsMustAgree) {
-  EXPECT_THROW(linear_image(Film(1, 1, 2), std::vector<Band>(3), Eigen::Matrix3d::Identity()), std::invalid_argument);
-  EXPECT_THROW(
-      spectral_image(Film(1, 1, 2), std::vector<Band>(3), SpectralQuantity::irradiance, 1, Eigen::Matrix3d::Identity()),
-      std::invalid_argument);
 }
 
 }  // namespace

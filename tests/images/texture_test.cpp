@@ -174,24 +174,6 @@ TEST(TextureTest, EdgesAreAsSoftAsTheFootprint) {
   }
 }
 
-TEST(TextureTest, AnyNumberOfThreadsSeesTheSame) {
-  const Image image = noise_image(700, 500);
-  const Texture texture(image, Wrap::mirror);
-  const auto look = [&](int i) {
-    Matrix2d footprint;
-    footprint << 1e-3 * (i % 17), 3e-4 * (i % 7), -2e-3 * (i % 5), 1e-3 * (i % 29);
-    return texture.lookup({std::fmod(i * 0.618034, 3), std::fmod(i * 0.754878, 3)}, footprint);
-  };
-  std::vector<Vector4f> together(20000);
-  tbb::parallel_for(0, 20000, [&](int i) { together[static_cast<std::size_t>(i)] = look(i); });
-  for (int i = 0; i < 20000; ++i) ASSERT_EQ(together[static_cast<std::size_t>(i)], look(i));
-}
-
-TEST(TextureTest, PicturesInMemoryMustHaveColours) {
-  EXPECT_THROW(Texture(Image(2, 2, {"Y"}), Wrap::none), std::invalid_argument);
-  EXPECT_THROW(Texture(Image(), Wrap::none), std::invalid_argument);
-}
-
 /// Texel x of a file that has one row.
 Vector4f texel_of(const std::filesystem::path& file, int x, const std::string& space = "") {
   const Texture texture(file, ColorManagement({}), space, Wrap::clamp);
@@ -280,15 +262,6 @@ TEST(TextureFileTest, OutsideOfItsDataWindowAPictureIsTransparent) {
   EXPECT_EQ(texel(3, 1), Vector4f(5, 2, 0.2f, 1));
   EXPECT_EQ(texel(1, 1), Vector4f(Vector4f::Zero()));
   EXPECT_EQ(texel(3, 0), Vector4f(Vector4f::Zero()));
-}
-
-TEST(TextureFileTest, FilteringIsOfLightNotOfNumbers) {
-  std::vector<int> values;
-  for (int i = 0; i < 64 * 64; ++i) values.insert(values.end(), 3, (i + i / 64) % 2 * 255);
-  const Temporary file("light.png", png_file(64, 64, 3, 8, values));
-  const Texture texture(file.path(), ColorManagement({}), "", Wrap::repeat);
-  for (const double size : {2.0, 7.0, 16.0, 64.0})
-    EXPECT_LT(difference(texture.lookup({0.3, 0.4}, Matrix2d::Identity() * size / 64), {0.5f, 0.5f, 0.5f, 1}), 1e-5);
 }
 
 TEST(TextureFileTest, LevelsOfLargeFilesHaveTheirMean) {

@@ -93,15 +93,6 @@ class LongCallsTest(unittest.TestCase):
                 sys.stderr = stream
             self.assertTrue(np.isfinite(picture.linear).all())
 
-    def test_progress(self):
-        seen = []
-        tr.render(SCENE, field=tr.make("vortex", resolution=24), changes={"light.photons": 3e5},
-                  progress=lambda *report: seen.append(report))
-        self.assertTrue(seen)
-        for phase, done, total in seen:
-            self.assertIsInstance(phase, str)
-            self.assertLessEqual(done, total)
-
     def test_an_exception_of_the_progress_ends_the_call(self):
         def stop(*_):
             raise LookupError("enough")

@@ -19,9 +19,6 @@ class PackageTest(unittest.TestCase):
         ended = subprocess.run([os.environ["TENSORRAY_BINARY"], "--version"], capture_output=True, text=True)
         self.assertEqual(ended.stdout, f"tensorray {tr.__version__}\n")
 
-    def test_the_schema_knows_the_keys(self):
-        self.assertIn("field", tr.schema()["properties"])
-
     def test_the_examples_of_the_documentation_run(self):
         page = os.path.join(os.path.dirname(__file__), "..", "..", "docs", "python.md")
         with open(page) as file:

@@ -71,14 +71,6 @@ class RendersTest(unittest.TestCase):
         self.same_files({"field": FIELD, **without}, [".exr"], field=tr.make(**FIELD["generate"]),
                         scene_for_python=without)
 
-    def test_a_field_of_an_array_gives_the_same_light(self):
-        made = tr.make("helix", resolution=16)
-        of_array = tr.Field(made.tensors, to_world=made.to_world)
-        a, b = (tr.render(PHOTONS, field=field) for field in (made, of_array))
-        np.testing.assert_array_equal(a.linear, b.linear)
-        again = tr.render(PHOTONS, field=made)
-        np.testing.assert_array_equal(a.linear, again.linear)
-
     def test_scene_files_and_changes(self):
         with open(self.path("scene.json"), "w") as file:
             file.write("// a comment\n" + json.dumps(PHOTONS))

@@ -122,13 +122,13 @@ TEST(Annotations, KnowTheSizeOfPixels) {
   Plate plate;
   plate.size = {3, 2};
   plate.resolution = {600, 100};
-  EXPECT_DOUBLE_EQ(view_of(plate).pixel_size.value(), 0.005);
+  EXPECT_DOUBLE_EQ(picture_view(plate).pixel_size.value(), 0.005);
   const Eigen::Vector3d position(0, -5, 0), target(0, 0, 0), up(0, 0, 1);
   const Camera parallel = orthographic_camera(position, target, up, 4, {100, 200});
-  EXPECT_DOUBLE_EQ(view_of(parallel).pixel_size.value(), 0.02);
-  EXPECT_TRUE(view_of(parallel).right.isApprox(Eigen::Vector3d::UnitX()));
-  EXPECT_TRUE(view_of(parallel).up.isApprox(Eigen::Vector3d::UnitZ()));
-  EXPECT_FALSE(view_of(perspective_camera(position, target, up, 30, {100, 200})).pixel_size);
+  EXPECT_DOUBLE_EQ(picture_view(parallel).pixel_size.value(), 0.02);
+  EXPECT_TRUE(picture_view(parallel).right.isApprox(Eigen::Vector3d::UnitX()));
+  EXPECT_TRUE(picture_view(parallel).up.isApprox(Eigen::Vector3d::UnitZ()));
+  EXPECT_FALSE(picture_view(perspective_camera(position, target, up, 30, {100, 200})).pixel_size);
 }
 
 /// @return the caption of a scene with these overrides, at a frame if one is given.

@@ -58,10 +58,5 @@ TEST(Exposure, IsTheScenesIfItNamesOne) {
   EXPECT_EQ(display_exposure(scene_of("photon_distribution", {{"exposure", -1.5}}), light_of({1, 32})), -1.5);
 }
 
-TEST(Exposure, OtherMethodsShowTheirColoursUnchanged) {
-  for (const std::string method : {"lens", "path_tracing", "stretch"})
-    EXPECT_EQ(scene_of(method, Json::object()).color.view(), "Un-tone-mapped") << method;
-}
-
 }  // namespace
 }  // namespace tensorray

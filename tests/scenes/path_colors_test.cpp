@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "scenes/outputs/wavelength_color.h"
+#include "scenes/outputs/annotations.h"
 
 namespace tensorray {
 namespace {

@@ -10,8 +10,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include "base/files/temporary_folder.h"
 #include "integrators/methods/read_scene.h"
 
 namespace tensorray::test {
@@ -24,14 +24,6 @@ inline const char* const smallest = R"({"field": {"file": "a.vdb"}, "integrator"
 /// Makes a folder for each test, and removes it after the test.
 class ReadScene : public ::testing::Test {
  protected:
-  ReadScene() {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ =
-        std::filesystem::path(::testing::TempDir()) / ("read_scene_" + std::to_string(getpid()) + "_" + test->name());
-    std::filesystem::create_directories(folder_);
-  }
-  ~ReadScene() override { std::filesystem::remove_all(folder_); }
-
   std::filesystem::path file(const std::string& text) const {
     std::filesystem::path path = folder_ / "scene.json";
     std::ofstream(path, std::ios::binary) << text;
@@ -55,7 +47,8 @@ class ReadScene : public ::testing::Test {
     return "";
   }
 
-  std::filesystem::path folder_;
+  const TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_ / "";
 };
 
 }  // namespace tensorray::test

@@ -124,34 +124,5 @@ TEST_F(ReadScene, TheConfigOfTheEnvironmentIsAnInputWhereItIsRead) {
   unsetenv("OCIO");
 }
 
-TEST_F(ReadScene, FilesThatAreNoScenes) {
-  EXPECT_THAT(error({}, ""), EndsWith("is empty; a scene is a JSON object with `field` and `integrator`"));
-  EXPECT_THAT(error({}, " \n"), HasSubstr("is empty"));
-  EXPECT_THAT(error({}, "[]"), HasSubstr("must be a JSON object"));
-  EXPECT_THAT(error({"seed=1"}, "3"), HasSubstr("must be a JSON object"));
-  EXPECT_THAT(error({}, std::string(100000, '[')), HasSubstr("nested deeper than 64"));
-  std::string objects;
-  for (int i = 0; i < 100000; ++i) objects += "{\"a\":";
-  EXPECT_THAT(error({}, objects), HasSubstr("nested deeper than 64"));
-  std::string garbage;
-  for (int i = 0; i < 3000; ++i) garbage += static_cast<char>((i * 7919 + i / 3) % 256);
-  EXPECT_THAT(error({}, garbage), HasSubstr("line 1, column 1"));
-  EXPECT_THAT(error({}, "{\"field\": {\"file\": \"\xff\xfe\"}}"), HasSubstr("UTF-8"));
-  EXPECT_THAT(error({}, "{\"" + std::string(100000, 'x')), HasSubstr("line 1, column"));
-}
-
-TEST_F(ReadScene, PathsThatAreNoFiles) {
-  const auto message = [](const fs::path& path) -> std::string {
-    try {
-      read_scene(path);
-    } catch (const SceneError& error) {
-      return error.what();
-    }
-    return "";
-  };
-  EXPECT_THAT(message(folder_ / "missing.json"), HasSubstr("missing.json: no such file"));
-  EXPECT_THAT(message(folder_), HasSubstr("is a folder"));
-}
-
 }  // namespace
 }  // namespace tensorray

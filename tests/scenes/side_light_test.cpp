@@ -44,13 +44,6 @@ double share(const Render& render, RayEnd which) {
   return power / all;
 }
 
-TEST(SideLight, IsThereByDefault) {
-  const Render usual = light_of("mesh", 0.5, nullptr), with = light_of("mesh", 0.5, true);
-  EXPECT_EQ(usual.linear.pixels, with.linear.pixels);
-  EXPECT_EQ(share(usual, RayEnd::side), 0);
-  EXPECT_THAT(usual.warnings, IsEmpty());
-}
-
 /// In this field V = (sin θ, 0, −cos θ) turns by θ' = −s cos 2θ. All light is displaced alike, by x on its way from
 /// z = 1 to z = −1, and the part |x| / 2 leaves by the sides.
 double displaced_part(double s) {
@@ -76,12 +69,6 @@ TEST(SideLight, IsLeftOutAndCounted) {
     ASSERT_EQ(without.warnings.size(), 1u) << density;
     EXPECT_THAT(without.warnings[0], HasSubstr("side faces")) << density;
   }
-}
-
-TEST(SideLight, OfStraightLightThereIsNone) {
-  const Render with = light_of("mesh", 0, true), without = light_of("mesh", 0, false);
-  EXPECT_EQ(share(without, RayEnd::side), 0);
-  EXPECT_EQ(with.linear.pixels, without.linear.pixels);
 }
 
 }  // namespace

@@ -184,21 +184,11 @@ TEST(Structure, NothingIncludesUpwards) {
 
 /// A room is read at one sitting: it has about a dozen files.
 TEST(Structure, RoomsHaveAboutADozenFiles) {
-  const std::map<std::string, std::size_t> crowded{
-      // Whole methods, from settings to picture.
-      {"integrators/lens", 17},
-      {"integrators/path_tracing", 16},
-      {"integrators/photon_distribution", 16},
-  };
   constexpr std::size_t most = 14;
   std::map<std::string, std::set<std::string>> files;
   for (const std::string& top : top_folders())
     for (const Line& line : lines_of(top)) files[line.folder()].insert(line.file);
-  for (const auto& [folder, names] : files) {
-    const auto exception = crowded.find(folder);
-    EXPECT_LE(names.size(), exception == crowded.end() ? most : exception->second) << folder;
-    EXPECT_TRUE(exception == crowded.end() || names.size() > most) << folder << " is no exception any more";
-  }
+  for (const auto& [folder, names] : files) EXPECT_LE(names.size(), most) << folder;
 }
 
 /// The tests of a library are in folders of the same names as its rooms.

@@ -49,18 +49,6 @@ TEST_F(LiveSceneTest, PicturesAfterChangesAreThoseOfANewScene) {
   }
 }
 
-TEST_F(LiveSceneTest, KeepsTheFieldWhileItsKeysStay) {
-  LiveScene live(scene_file());
-  Json scene = test::small_scene();
-  const auto voxels = [&] { return live.load(scene, outputs_, progress_).field.brick({0, 0, 0}).bending; };
-  const float* const first = voxels();
-  scene["receiver"]["distance"] = 0.5;
-  scene["field"]["scale"] = 2;
-  EXPECT_EQ(voxels(), first);
-  LiveScene other(scene_file());  // Its memory is elsewhere.
-  EXPECT_NE(other.load(scene, outputs_, progress_).field.brick({0, 0, 0}).bending, first);
-}
-
 TEST_F(LiveSceneTest, ARecolouredPictureIsNotRenderedAgain) {
   LiveScene live(scene_file());
   Json scene = test::small_scene();

@@ -31,14 +31,6 @@ class PagesTest : public test::ViewTest {
   }
 };
 
-TEST_F(PagesTest, GreetsWithSceneAndSchema) {
-  const Json hello = mailbox_.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
-  EXPECT_EQ(hello.at("scene"), test::small_scene());
-  EXPECT_TRUE(hello.at("schema").at("properties").contains("light"));
-  EXPECT_EQ(hello.at("field").at("corners").size(), 8u);
-  EXPECT_EQ(hello.at("field").at("voxels")[0], 12);
-}
-
 TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
   send_scene(1, test::small_scene());
   const test::Received last = mailbox_.final_picture(1);

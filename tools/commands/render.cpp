@@ -9,7 +9,7 @@
 
 #include "base/files/distinct_files.h"
 #include "base/text/text.h"
-#include "integrators/methods/methods.h"
+#include "integrators/methods/read_scene.h"
 #include "scenes/source/frames.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"

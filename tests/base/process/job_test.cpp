@@ -180,17 +180,5 @@ TEST(JobTest, ResultsAreFoundOrMade) {
   EXPECT_THROW(find(damaged), DamagedArchive);
 }
 
-TEST(RanksTest, GiveWhatTheyHave) {
-  run_ranks(3, [](Ranks& ranks) {
-    EXPECT_EQ(broadcast(&ranks, ranks.rank() + 5), 5u);
-    std::string text = is_root(&ranks) ? "of the root" : "other";
-    broadcast_list(&ranks, text);
-    EXPECT_EQ(text, "of the root");
-    std::size_t sum = ranks.rank();
-    gather_in_turn(&ranks, [&](Archive& archive) { archive.copy_sums(&sum, 1); });
-    EXPECT_EQ(sum, is_root(&ranks) ? 3 : ranks.rank());
-  });
-}
-
 }  // namespace
 }  // namespace tensorray

@@ -43,22 +43,6 @@ Matrix3d read_one(const std::string& header, const std::vector<float>& component
   return tensor ? Matrix3d(tensor->cast<double>()) : Matrix3d(Matrix3d::Constant(NAN));
 }
 
-TEST(Nrrd, HelixHasItsFacts) {
-  const auto path = data_file("dt_helix/dt-helix.nrrd");
-  SKIP_WITHOUT(path);
-  const Lattice lattice = open_nrrd(path);
-  EXPECT_EQ(lattice.size, Vector3i(38, 39, 40));
-  EXPECT_TRUE(lattice.masked);
-  LatticeReport report;
-  const TensorGrid grid = tensors_of(lattice, {}, report);
-  EXPECT_EQ(report.voxels, 38u * 39 * 40);
-  EXPECT_GT(report.active, 0u);
-  EXPECT_LT((grid.to_world.translation() - Vector3d(-2.336842, -2.338462, -2.34)).norm(), 1e-9);
-  const auto [least, greatest] = test::eigenvalues_of(grid);
-  EXPECT_GT(least, 0.2365);
-  EXPECT_LT(greatest, 0.3035);
-}
-
 TEST(Nrrd, EachKindHasItsComponentsOrderAndMask) {
   const Matrix3d symmetric = test::symmetric_tensor(), general = test::general_tensor();
   const auto with_mask = [](double mask, std::vector<float> components) {
@@ -76,17 +60,6 @@ TEST(Nrrd, EachKindHasItsComponentsOrderAndMask) {
   EXPECT_TRUE(read_one(header("3D-masked-symmetric-matrix", 7), with_mask(0, six(symmetric))).hasNaN());
   EXPECT_TRUE(read_one(header("3D-masked-matrix", 10), with_mask(0, nine(general))).hasNaN());
   test::expect_error([&] { read_one(header("list", 6), six(symmetric)); }, {"--order"});
-}
-
-TEST(Nrrd, TheMeasurementFrameIsAppliedOnceAndNotTransposed) {
-  const Matrix3d frame = test::rotation(), t = test::general_tensor(), expected = frame * t * frame.transpose();
-  const std::string fields = oblique_fields + measurement_frame(frame);
-  const Matrix3d found = read_one(header_of("3D-matrix", 9, {1, 1, 1}, fields), nine(t));
-  EXPECT_LT((found - expected).norm(), 1e-5);
-  // The result must differ, so that leaving out, transposing or repeating the frame would be detected.
-  EXPECT_GT((found - t).norm(), 0.1);
-  EXPECT_GT((found - frame.transpose() * t * frame).norm(), 0.1);
-  EXPECT_GT((found - frame * expected * frame.transpose()).norm(), 0.1);
 }
 
 TEST(Nrrd, AnatomicalSpacesAreTurnedToRasWithTheMeasurementFrame) {

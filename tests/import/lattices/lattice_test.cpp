@@ -78,22 +78,6 @@ TEST(Lattice, BlocksAreOrderedAndOnlyThoseWithActiveVoxels) {
   });
 }
 
-TEST(Lattice, TheFrameForFslIsThatOfItsOrderAlone) {
-  const Matrix3d turn = test::rotation();
-  const auto lattice = [&] {
-    Lattice six = lattice_of({1, 1, 1}, [](const Vector3i&) { return std::vector<double>{1.5, 0.75, 2, 0, 0, 0}; });
-    six.to_world.linear() = turn * Vector3d(-1, 1, 1).asDiagonal();
-    six.order_tells_frame = true;
-    return six;
-  };
-  const Matrix3d fsl = (Matrix3d() << 1.5, 0.75, 2, 0.75, 0, 0, 2, 0, 0).finished(),
-                 frame = lattice().to_world.linear();
-  test::expect_near(frame * fsl * frame.transpose(),
-                    test::voxel(test::tensors_of(lattice(), TensorOrder::fsl), {0, 0, 0}), 1e-5);
-  test::expect_near(Vector3d(1.5, 0.75, 2).asDiagonal(),
-                    test::voxel(test::tensors_of(lattice(), TensorOrder::mrtrix), {0, 0, 0}));
-}
-
 TEST(Lattice, SymmetricTensorsStaySymmetricWhenTurned) {
   Lattice lattice = lattice_of({16, 8, 8}, [](const Vector3i& i) -> std::vector<double> {
     return {std::sin(i.x() + 0.1), std::sin(i.y() + 0.2), 0.3 * i.z(), std::cos(i.x() * 1.0), 1.0 * i.y(), 0.7};

@@ -37,17 +37,6 @@ void expect_tensors(vtkDataSet& mesh, const std::string& list, std::optional<Ten
   }
 }
 
-/// Also where an array has the name of the new one.
-TEST(ComponentArrays, SixInAnyOrderThatTheirNamesTellAndNine) {
-  for (const char* list : {"sxx,syy,szz,sxy,syz,sxz", "sxx, sxy, sxz, syy, syz, szz", "sxx,syy,szz,szy,szx,syx",
-                           "sxx,sxy,syy,sxz,syz,szz", "sxx,sxy,sxz,sxy,syy,syz,sxz,syz,szz"}) {
-    const Grid mesh = cube_with_components(symmetric);
-    add_array<1>(*mesh, "tensor", [](const Vector3d&) { return Eigen::Matrix<double, 1, 1>(7.0); });
-    expect_tensors(*mesh, list, {}, symmetric);
-  }
-  expect_tensors(*cube_with_components(linear_tensor), "sxx,sxy,sxz,syx,syy,syz,szx,szy,szz", {}, linear_tensor);
-}
-
 TEST(ComponentArrays, NamesThatTellNoOrderNeedOne) {
   const Grid mesh = cube_with_components(symmetric);
   const char* const given[] = {"sxx", "syy", "szz", "syz", "sxz", "sxy"};

@@ -114,18 +114,6 @@ TEST(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
     }
 }
 
-TEST(FlatMesh, DefaultsAreATypicalEdge) {
-  const TemporaryFolder folder;
-  const Grid mesh = square(VTK_QUAD);
-  add_array<9>(*mesh, "T", [](const Vector3d& p) { return flat(plane_tensor(p)); });
-  write_xml(*mesh, folder / "a.vtu");
-  double thickness = 0;
-  const TensorGrid grid = import(folder / "a.vtu", {}, &thickness);
-  EXPECT_NEAR(thickness, 0.5, 1e-12);
-  EXPECT_EQ(grid.active_voxels(), 81u);
-  EXPECT_NEAR(grid.to_world.linear()(0, 0), 0.5, 1e-12);
-}
-
 TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
   const TemporaryFolder folder;
   const Grid mesh = square(VTK_QUAD);

@@ -69,19 +69,6 @@ TEST(MeshBoundary, AConvexMeshHasNoneAndLeavesNoFile) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-TEST(MeshBoundary, TheSeamOfAWrappedGridIsNoFace) {
-  const auto path = file_name("cylinder");
-  const int around = 24;
-  EXPECT_EQ(write_boundary(*hollow_cylinder(around, 1), path), 24u * 4u * 2u);
-  const TriangleMesh mesh = read_mesh(path);
-  for (const Vector3d& vertex : mesh.vertices) EXPECT_NEAR(vertex.head<2>().norm(), 1, 1e-12);
-  for (const auto& t : mesh.triangles) {
-    const Vector3d a = mesh.vertices[t[0]], b = mesh.vertices[t[1]], c = mesh.vertices[t[2]];
-    const Vector3d middle = (a + b + c) / 3;
-    EXPECT_GT((b - a).cross(c - a).dot(Vector3d(middle.x(), middle.y(), 0)), 0);  // away from the axis
-  }
-}
-
 TEST(MeshBoundary, CurvedFacesKeepTheirMiddleNodes) {
   const auto path = file_name("curved");
   const Grid grid = unit_cube(VTK_QUADRATIC_HEXAHEDRON, 4, [](const Vector3d& p) {

@@ -77,35 +77,6 @@ TEST(MeshTensors, SurfacesInAMeshDoNotChangeItsDerivatives) {
   expect_everywhere(*with_tensors(*mesh, {"velocity"}, Take::gradient, {}), velocity_gradient(), 1e-10);
 }
 
-TEST(MeshTensors, NamesOfComponentsSayTheOrder) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 1, identity);
-  add_array<10>(*mesh, "S", [](const Vector3d&) {
-    return Eigen::Matrix<double, 10, 1>(Eigen::Matrix<double, 10, 1>::LinSpaced(1, 10));
-  });
-  vtkDataArray& array = *mesh->GetPointData()->GetArray("S");
-  const char* const names[] = {"S11", "S22", "S33", "S23", "S31", "S12"};
-  for (int i = 0; i < 6; ++i) array.SetComponentName(i, names[i]);
-  Matrix3d voigt;
-  voigt << 1, 6, 5, 6, 2, 4, 5, 4, 3;
-  expect_everywhere(*with_tensors(*mesh, {"S"}, Take::tensor, {}), voigt, 1e-15);
-  expect_everywhere(*with_tensors(*mesh, {"S"}, Take::tensor, TensorOrder::voigt), voigt, 1e-15);
-  EXPECT_THAT([&] { with_tensors(*mesh, {"S"}, Take::tensor, TensorOrder::vtk); },
-              ThrowsMessage<std::invalid_argument>(AllOf(HasSubstr("the file itself names the components"),
-                                                         HasSubstr("S11 S22 S33 S23 S31 S12"), HasSubstr("--order"))));
-}
-
-TEST(MeshTensors, CellArraysAreAveragedToPoints) {
-  const auto mesh = curvilinear({3, 2, 2}, identity);
-  add_constant_cell_array(*mesh, "T", 9, 2);
-  mesh->GetCellData()->GetArray("T")->SetComponent(1, 5, 8);  // component 5 of the second cell
-  const auto tensors = with_tensors(*mesh, {"T", true}, Take::tensor, {});
-  EXPECT_EQ(tensor_at(*tensors, 0)(1, 2), 2);
-  EXPECT_EQ(tensor_at(*tensors, 1)(1, 2), 5);
-  EXPECT_EQ(tensor_at(*tensors, 2)(1, 2), 8);
-  EXPECT_EQ(tensor_at(*tensors, 2)(2, 1), 2);
-  EXPECT_EQ(tensors->GetNumberOfCells(), 2);
-}
-
 TEST(ChooseArray, TakesTheNamedOrTheOnlyOneThatSuits) {
   const auto mesh = unit_cube(VTK_HEXAHEDRON, 1, identity);
   add_linear_velocity(*mesh, velocity_gradient());

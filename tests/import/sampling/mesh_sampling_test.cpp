@@ -81,25 +81,6 @@ TEST(MeshSampling, QuadraticCellsGiveAQuadraticFieldExactly) {
   EXPECT_LT(worst, 1e-5);
 }
 
-TEST(MeshSampling, HolesAndTheOutsideAreInactive) {
-  const int around = 64;
-  const auto mesh = hollow_cylinder(around, 1);
-  add_linear_tensor(*mesh);
-  const double inner_flat = std::cos(pi / around);  // where the faceted circle is closest to the axis
-  std::size_t inside = 0;
-  for_each_voxel(sampled(*mesh, resolution(50)), [&](const Vector3d& p, const Matrix3d&) {
-    const double radius = p.head<2>().norm();
-    EXPECT_GT(radius, inner_flat - 1e-5);
-    EXPECT_LT(radius, 2 + 1e-5);
-    ++inside;
-  });
-  SamplingReport report;
-  sampled(*mesh, resolution(101), report);
-  const double expected = pi * (4 - 1) / 16;
-  const double fraction = static_cast<double>(report.active) / report.size.cast<double>().prod();
-  EXPECT_NEAR(fraction, expected, 0.02);
-}
-
 TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
   const auto mesh =
       unit_cube(VTK_HEXAHEDRON, 4, [](const Vector3d& p) { return Vector3d(2 * p.x() + 1, p.y(), p.z() / 2); });
@@ -169,21 +150,6 @@ TEST(MeshSampling, ReportsThePeakThatCoarseVoxelsMiss) {
   EXPECT_EQ(report.sampled_median, 0);
   sampled(*mesh, resolution(17), report);
   EXPECT_NEAR(report.sampled_peak, std::sqrt(3.0), 1e-6);
-}
-
-TEST(MeshSampling, VoxelsThatNeedAPointThatIsNotANumberAreInactive) {
-  const auto mesh = curvilinear({5, 5, 5}, identity);
-  add_array<9>(*mesh, tensor_array, [](const Vector3d& p) {
-    Eigen::Matrix<double, 9, 1> tensor = flat(linear_tensor(p));
-    if (p.isApprox(Vector3d(0.5, 0.5, 0.5))) tensor.setConstant(std::numeric_limits<double>::quiet_NaN());
-    return tensor;
-  });
-  SamplingReport report;
-  const TensorGrid grid = sampled(*mesh, resolution(17), report);
-  EXPECT_EQ(report.non_finite, 1u);
-  EXPECT_EQ(report.active,
-            17u * 17u * 17u - 7u * 7u * 7u);  // all points strictly within the eight cells around the hidden point
-  expect_linear(grid);
 }
 
 TEST(MeshSampling, OfCellsThatListMorePointsThanTheirTypeHasTheFirstCount) {

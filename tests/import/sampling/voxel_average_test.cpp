@@ -67,34 +67,6 @@ TEST(VoxelAverages, OfABoundaryLayerHaveLessErrorThanTheirCentres) {
   }
 }
 
-// Along a wall that is oblique to the voxels, samples at centres take the layer here and miss it there. What light
-// meets on its way through the layer, the sum over a column of voxels, should be the same everywhere.
-TEST(VoxelAverages, OfAnObliqueLayerHaveLessMoire) {
-  const double slope = 0.13, voxel = 0.05;
-  const auto mesh = graded_mesh([&](const Vector3d& p) { return Vector3d(p.x(), p.y(), p.z() + slope * p.x()); });
-  const auto distance = [&](const Vector3d& p) { return p.z() - slope * p.x(); };
-  // The layer is within the mesh, half a voxel from its wall.
-  const double depth = 0.1;
-  add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) {
-    return flat(std::exp(-std::abs(distance(p) - depth) / (layer / 4)) * Matrix3d::Identity());
-  });
-  std::map<std::pair<long, long>, std::array<double, 2>> columns;  // Sums of averages, and of values at centres.
-  for_each_voxel(sampled(*mesh, voxel), [&](const Vector3d& p, const Matrix3d& tensor) {
-    if (p.x() < 0.1 || p.x() > 0.9) return;
-    auto& sums = columns[{std::lround(p.x() / voxel * 4), std::lround(p.y() / voxel * 4)}];
-    sums[0] += tensor(0, 0);
-    sums[1] += std::exp(-std::abs(distance(p) - depth) / (layer / 4));
-  });
-  ASSERT_GT(columns.size(), 100u);
-  const auto spread = [&](std::size_t which) {
-    double sum = 0, squares = 0;
-    for (const auto& [column, sums] : columns) sum += sums[which], squares += sums[which] * sums[which];
-    const double mean = sum / static_cast<double>(columns.size());
-    return std::sqrt(std::max(0.0, squares / static_cast<double>(columns.size()) - mean * mean)) / mean;
-  };
-  EXPECT_LT(spread(0), 0.2 * spread(1)) << spread(1);
-}
-
 TEST(VoxelAverages, OfALinearFieldAreItsValuesAtTheCentresAlsoAtWalls) {
   for (const int type : {VTK_HEXAHEDRON, VTK_TETRA, VTK_WEDGE, VTK_PYRAMID, VTK_QUADRATIC_HEXAHEDRON}) {
     const auto mesh = unit_cube(type, 12, bent);
@@ -131,15 +103,6 @@ TEST(VoxelAverages, AreTheSameBitsOnAnyNumberOfThreads) {
     for (std::size_t k = 0; k < grids[0].blocks.size(); ++k)
       EXPECT_TRUE(grids[i].blocks[k].values == grids[0].blocks[k].values);
   }
-}
-
-TEST(VoxelAverages, OfSamplesOfALinearFunctionAreItsValueAtTheCentre) {
-  VoxelAverage average;
-  const auto value = [](const Vector3d& p) { return flat(linear_tensor(p)); };
-  for (const Vector3d& p :
-       {Vector3d(0, 0, 0.5), Vector3d(0.2, -0.1, 0.3), Vector3d(-0.4, 0.1, 0.1), Vector3d(0.1, 0.3, 0)})
-    average.add(p, 0.1 + p.z(), value(p));
-  EXPECT_LT((average.value() - value(Vector3d::Zero())).norm(), 1e-6);
 }
 
 /// Twelve cubes in a row; a cell array `T` is 1 in all of them but one, which has `lone`.

@@ -88,19 +88,6 @@ TEST(ImageLatticeTest, CellsAreAtTheirCentres) {
   EXPECT_EQ(read_all(lattice)[6 * 23 + 5], 2305);
 }
 
-TEST(ImageLatticeTest, FlatImages) {
-  vtkNew<vtkImageData> image;
-  image->SetDimensions(4, 1, 3);
-  image->SetSpacing(0.5, 0, 2);
-  image->SetOrigin(0, 7, 0);
-  const auto points = counting<vtkFloatArray>("p", 9, 12), cells = counting<vtkFloatArray>("c", 9, 6);
-  const Lattice of_points = lattice_of(image.Get(), points, false), of_cells = lattice_of(image.Get(), cells, true);
-  EXPECT_EQ(of_points.size, Eigen::Vector3i(4, 1, 3));
-  EXPECT_EQ(of_cells.size, Eigen::Vector3i(3, 1, 2));
-  EXPECT_DOUBLE_EQ(of_points.to_world.linear().determinant(), 0.5 * 0.5 * 2);
-  EXPECT_TRUE((of_cells.to_world * Eigen::Vector3d(0, 0, 0)).isApprox(Eigen::Vector3d(0.25, 7, 1)));
-}
-
 TEST(ImageLatticeTest, ImagesThatCannotBe) {
   const auto image = oblique_image();
   const auto array = counting<vtkFloatArray>("stress", 9, image->GetNumberOfPoints() - 1);

@@ -77,27 +77,6 @@ TEST(VtkSourceTest, UnstructuredPiecesAreMergedAndGhostCellsRemoved) {
   EXPECT_NE(read_error(folder / "all.pvtu").find("p1.vtu: "), std::string::npos);
 }
 
-TEST(VtkSourceTest, ImagePiecesAreOneImage) {
-  const std::filesystem::path path = data_file("pv_tensors/tensors.pvti");
-  SKIP_WITHOUT(path);
-  const vtkSmartPointer<vtkImageData> read = vtkImageData::SafeDownCast(read_vtk_source(path).Get());
-  ASSERT_TRUE(read);
-  vtkDataArray* const gradient = read->GetPointData()->GetArray("grad-ue");
-  ASSERT_TRUE(gradient);
-  const Lattice lattice = lattice_of(read, gradient, false);
-  EXPECT_EQ(lattice.size, Eigen::Vector3i(64, 1, 64));
-  EXPECT_EQ(lattice.components, 9);
-  EXPECT_TRUE((lattice.to_world * Eigen::Vector3d::Zero()).isApprox(Eigen::Vector3d(7206, 0, 981)));
-  // Each piece is at the place that the whole file gives it. Check a point of the last piece.
-  const vtkSmartPointer<vtkImageData> piece =
-      vtkImageData::SafeDownCast(read_vtk_source(data_file("pv_tensors/tensors_3.vti")).Get());
-  int from[3] = {310, 0, 140};
-  for (int c = 0; c < 9; ++c) {
-    EXPECT_EQ(gradient->GetComponent(read->ComputePointId(from), c),
-              piece->GetPointData()->GetArray("grad-ue")->GetComponent(piece->ComputePointId(from), c));
-  }
-}
-
 TEST(VtkSourceTest, ExodusMeshIsNotMovedByItsArrays) {
   const std::filesystem::path path = data_file("disk_out_ref/disk_out_ref.ex2");
   SKIP_WITHOUT(path);

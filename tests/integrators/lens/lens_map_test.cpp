@@ -133,53 +133,6 @@ TEST(LensMap, NoPlaneStopsTheLightThatStartsOnIt) {
     }
 }
 
-TEST(LensMap, TurningFieldBendsLightToArcs) {
-  const double s = 0.5, rate = 0.7;
-  const TensorField field = turning_field(rate * Vector3d::UnitX());  // −z turns towards +y.
-  const Vector2d start(0.1, -0.9);
-  for (const double above : {1.0, 1.75})
-    for (const double below : {1.0, 2.5}) {
-      const Arc arc(2, s * rate, below - 1);
-      for (const BendingMethod method : {BendingMethod::splitting, BendingMethod::dopri5}) {
-        const bool is_precise = method == BendingMethod::dopri5;
-        const BendingSettings settings = is_precise ? precise() : settings_of(method, 0);
-        const LensLanding landing = land(make_map(field, plane_at(above), plane_at(-below), down, settings), start, s);
-        ASSERT_EQ(landing.end, RayEnd::plate);
-        // A step of half a voxel replaces an arc by its chords: the length is less by a factor of 1 − (s rate h)²/12.
-        const double tolerance = is_precise ? 1e-7 : std::pow(s * rate * 0.5 * voxel_size(field), 2) * arc.aside;
-        EXPECT_LT((landing.at - start - Vector2d(0, arc.aside)).norm(), tolerance);
-        EXPECT_LT((landing.jacobian - Matrix2d::Identity()).norm(), 1e-6);
-        EXPECT_NEAR(landing.length, above - 1 + arc.length, is_precise ? 1e-7 : 2e-3);
-      }
-    }
-}
-
-TEST(LensMap, TurningAboutTheLightDoesNothing) {
-  const TensorField field = turning_field(2 * Vector3d::UnitZ());
-  const LensLanding landing = land(make_map(field, plane_at(1.5), plane_at(-1.5), down), {0.4, 0.2}, 0.5);
-  ASSERT_EQ(landing.end, RayEnd::plate);
-  EXPECT_LT((landing.at - Vector2d(0.4, 0.2)).norm(), 1e-9);
-  EXPECT_LT((landing.jacobian - Matrix2d::Identity()).norm(), 1e-9);
-}
-
-TEST(LensMap, DiagonalFieldTurnsLightByItsClosedForm) {
-  const Vector3d rates(1, -0.5, 0.25), direction = Vector3d(-0.3, 0.2, -1).normalized();
-  const TensorField field = constant_field(rates.asDiagonal());
-  const Vector2d start(0.2, -0.1);
-  for (const double s : {0.4, -0.4}) {
-    // Light is straight between the planes 1 and 2 behind the volume: its landings on both give its direction.
-    const LensLanding at_volume = land(make_map(field, plane_at(1), plane_at(-1), direction), start, s);
-    const LensLanding behind = land(make_map(field, plane_at(1), plane_at(-2), direction), start, s);
-    ASSERT_EQ(at_volume.end, RayEnd::plate);
-    ASSERT_EQ(behind.end, RayEnd::plate);
-    const Vector3d V =
-        ((s * at_volume.length * rates).array().exp() * direction.array()).matrix().normalized();  // At the exit.
-    EXPECT_LT((behind.at - at_volume.at - V.head<2>() / -V.z()).norm(), 1e-6);
-    EXPECT_NEAR(behind.length - at_volume.length, 1 / -V.z(), 1e-6);
-    EXPECT_LT((behind.jacobian - Matrix2d::Identity()).norm(), 1e-6);
-  }
-}
-
 /// The Jacobian of `spreading_field` on its axis: light obeys x'' = ±s k x there, + for light along +z.
 double magnification(double curvature, double depth, double distance) {
   const std::complex<double> root = std::sqrt(std::complex<double>(curvature));
@@ -211,23 +164,6 @@ TEST(LensMap, SplittingsJacobianIsOfSecondOrder) {
   }
   EXPECT_LT(error[0], 0.01);
   EXPECT_NEAR(error[0] / error[1], 4, 0.4);
-}
-
-TEST(LensMap, SwirlTurnsTheImage) {
-  const double rate = 2, s = 0.4, distance = 0.5;
-  const TensorField field = swirling_field(rate);
-  for (const Vector3d& direction : {up, down}) {
-    const Plate from = plane_at(-direction.z()), to = plane_at((1 + distance) * direction.z());
-    const LensLanding landing = land(make_map(field, from, to, direction), {0, 0}, s);
-    ASSERT_EQ(landing.end, RayEnd::plate);
-    // With z = x + iy: z'' = ± i s rate z.
-    const std::complex<double> root = std::sqrt(std::complex<double>(0, s * rate * direction.z()));
-    const std::complex<double> m = std::cosh(2.0 * root) + root * std::sinh(2.0 * root) * distance;
-    Matrix2d expected;
-    expected << m.real(), -m.imag(), m.imag(), m.real();
-    EXPECT_LT((landing.jacobian - expected).norm(), 1e-6);
-    EXPECT_GT(std::abs(m.imag()), 0.5);  // It does turn.
-  }
 }
 
 TEST(LensMap, JacobianIsThatOfTheLandings) {
@@ -282,16 +218,6 @@ TEST(LensMap, TurningLightReachesNeitherBeyondThePlaneNorBehindItsStart) {
   }
 }
 
-TEST(LensMap, ObstaclesStopLight) {
-  const TensorField field = constant_field(Matrix3d::Zero());
-  Surfaces surfaces = surfaces_of(field);
-  surfaces.obstacles.push_back(
-      box_mesh(Eigen::AlignedBox3d(Vector3d(0, -0.5, -1.4), Vector3d(0.5, 0.5, -1.2)), Eigen::Affine3d::Identity()));
-  const LensMap map(field, surfaces, {}, plane_at(1.5), plane_at(-1.5), down);
-  EXPECT_EQ(land(map, {0.25, 0}, 1).end, RayEnd::obstacle);
-  EXPECT_EQ(land(map, {-0.25, 0}, 1).end, RayEnd::plate);
-}
-
 TEST(LensMap, LandingsAreOrderedByStartThenFlexibility) {
   const TensorField field = cube_field(9, linear_tensor);
   const LensMap map = make_map(field, plane_at(1.5), plane_at(-1.5), down, {});
@@ -314,12 +240,6 @@ TEST(LensMap, LandingsAreOrderedByStartThenFlexibility) {
   EXPECT_GE(counts.tensor_samples + 6, sum.tensor_samples);
   EXPECT_GT(counts.ray_steps, 0u);
   EXPECT_LT((landings[3].at - starts[1]).norm(), single_precision);  // s = 0: straight.
-}
-
-TEST(LensMap, SettingsOutOfRangeAreRefused) {
-  const TensorField field = constant_field(Matrix3d::Zero());
-  const LensMap map = make_map(field, plane_at(1.5), plane_at(-1.5), down, settings_of(BendingMethod::rk4, -1));
-  EXPECT_THROW(land(map, {0, 0}, 1), std::invalid_argument);
 }
 
 /// Gathers from `receiver` to `image` with −s, as the lens does, and follows the reversed light with +s.
@@ -354,17 +274,6 @@ double worst_return(const TensorField& field, double s, double tolerance, int& c
       ++count;
     }
   return worst;
-}
-
-TEST(LensMap, GatheredLightCanBeRetraced) {
-  int count = 0;
-  EXPECT_LT(worst_return(cube_field(9, linear_tensor), 0.3, 1e-7, count), 1e-4);
-  EXPECT_EQ(count, 64);
-  GridSettings grid;
-  grid.resolution.setConstant(17);
-  // Trilinear data have kinks between the voxels, at which the error of a step is of a lower order.
-  EXPECT_LT(worst_return(TensorField(generate(Vortex{}, grid)), 0.1, 1e-9, count), 1e-4);
-  EXPECT_EQ(count, 64);
 }
 
 }  // namespace

@@ -77,19 +77,6 @@ TEST(Lens, ASmallerImageLeavesPixelsThatSeeNothing) {
   }
 }
 
-TEST(Lens, AWrappedImageIsEverywhere) {
-  const Image picture = noise(24, 16);
-  const Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {0.75, 0.5}, picture, Wrap::repeat);
-  const LensPicture seen = bench.simulate(LensMode::gather);
-  for (int y = 0; y < 32; ++y)
-    for (int x = 0; x < 48; ++x) {
-      const std::size_t pixel = static_cast<std::size_t>(y * 48 + x);
-      EXPECT_EQ(seen.points[pixel].end, LensEnd::image);
-      EXPECT_NEAR(seen.alpha[pixel], 1, 1e-6);
-      EXPECT_NEAR(seen.radiance.plane(0)[pixel], picture.pixel((x + 12) % 24, (y + 8) % 16)[0], 1e-5);
-    }
-}
-
 TEST(Lens, AnObstacleHidesTheImage) {
   Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, uniform(0.5f), Wrap::clamp);
   const double pixel = 1.5 / 48;  // Its edges lie between pixels.
@@ -123,63 +110,6 @@ TEST(Lens, SamplesOfAUniformImageHaveItsRadiance) {
     }
 }
 
-TEST(Lens, SamplesDescribeTheSamePoints) {
-  Bench bench(cube_field(9, linear_tensor), plate_at(1.5, {0.6, 0.4}, {24, 16}), {3, 3}, noise(64, 64));
-  bench.channels = {{0.1, 0, 1}, {0.15, 0, 1}};
-  bench.settings.reference = 1;
-  for (const LensMode mode : modes) {
-    const LensPicture one = bench.simulate(mode);
-    for (const int samples : {2, 3}) {
-      bench.settings.samples = samples;
-      const LensPicture more = bench.simulate(mode);
-      for (std::size_t i = 0; i < one.points.size(); ++i) {
-        ASSERT_LT((more.points[i].st - one.points[i].st).norm(), 1e-12);
-        ASSERT_EQ(more.points[i].folds, one.points[i].folds);
-      }
-    }
-    bench.settings.samples = 1;
-  }
-}
-
-TEST(Lens, AStronglyMagnifiedImageHasNoCracks) {
-  const auto tensor = [](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T.col(2) << 1.5 * std::sin(2 * p.x()) * std::cos(p.y()), 1.5 * std::sin(2 * p.y()) + 0.8 * p.x(), 0;
-    return T;
-  };
-  Bench bench(cube_field(17, tensor), plate_at(1.5, {1.6, 1.6}, {40, 40}), {0.8, 0.8}, uniform(1));
-  bench.settings.samples = 3;
-  const LensPicture seen = bench.simulate(LensMode::scatter, 0.5);
-  double most = 0;
-  for (std::size_t i = 0; i < seen.points.size(); ++i) {
-    ASSERT_EQ(seen.points[i].end, LensEnd::image);
-    ASSERT_NEAR(seen.alpha[i], 1, 1e-6);
-    most = std::max(most, seen.points[i].log_magnification);
-  }
-  EXPECT_GT(most, std::log(15.0));
-}
-
-TEST(Lens, ATornImageShowsAGap) {
-  const double rate = 0.3, angle = std::asin(2 * rate), pixel = 3.0 / 60;
-  const double aside = (1 - std::cos(angle)) / rate + 0.5 * std::tan(angle);
-  Matrix3d T = Matrix3d::Zero();  // Light along +z turns towards +y; beside the volume it is straight.
-  T(1, 2) = rate;
-  T(2, 1) = -rate;
-  Bench bench(constant_field(T), plate_at(1.5, {3, 3}, {60, 60}), {3, 3}, uniform(1), Wrap::clamp);
-  const LensPicture seen = bench.simulate(LensMode::scatter, 1);
-  int dark = 0;
-  for (int row = 0; row < 60; ++row)
-    for (int column = 0; column < 60; ++column) {
-      const double x = (column + 0.5) * pixel - 1.5, y = 1.5 - (row + 0.5) * pixel;
-      const auto near = [&](double value, double edge) { return std::abs(value - edge) < 0.6 * pixel; };
-      if (near(x, -1) || near(x, 1) || near(y, -1) || near(y, -1 + aside)) continue;
-      const bool in_gap = std::abs(x) < 1 && y > -1 && y < -1 + aside;
-      EXPECT_NEAR(seen.alpha[static_cast<std::size_t>(row * 60 + column)], in_gap ? 0 : 1, 1e-6) << x << " " << y;
-      dark += in_gap;
-    }
-  EXPECT_GT(dark, 200);
-}
-
 TEST(Lens, TheSameOnAnyNumberOfThreads) {
   Bench bench(cube_field(9, linear_tensor), plate_at(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, noise(48, 32));
   bench.channels = {{0.1, 0, 1}, {0.3, 0, 1}};
@@ -204,6 +134,26 @@ TEST(Lens, TheSameOnAnyNumberOfThreads) {
   }
 }
 
+/// A picture of one channel in the light of equal bands of a range of flexibilities, or of single ones.
+LensPicture picture_of(const Bench& bench, LensMode mode, const std::vector<double>& flexibilities, bool range,
+                       int count) {
+  LensSettings settings = bench.settings;
+  settings.mode = mode;
+  settings.flexibilities = flexibilities;
+  settings.range = range;
+  std::vector<LensBand> bands;
+  for (int i = 0; i < count; ++i) {
+    const double begin = static_cast<double>(i) / (range ? count : count - 1), end = range ? (i + 1.0) / count : begin;
+    bands.push_back({begin, end, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
+  }
+  const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending,
+                                     {bench.receiver, bench.image, Vector3d::UnitZ()}, settings, Progress());
+  const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+    std::fill(radiances, radiances + (last - first), rgb.x());
+  };
+  return draw_lens(light, bands, radiance, 1, true, Progress());
+}
+
 /// A few bands of a range show what many single wavelengths show together, without steps between them.
 TEST(Lens, ARangeIsAContinuumOfWavelengths) {
   Image edge(256, 256, {"R", "G", "B"});  // White on its left side.
@@ -216,30 +166,13 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
                            return T;
                          }),
               plate_at(1.5, {1, 1}, {64, 16}), {4, 4}, edge);
+  bench.settings.samples = 2;
   for (const LensMode mode : modes) {
-    const auto seen = [&](std::vector<double> flexibilities, bool range, int count) {
-      LensSettings settings;
-      settings.mode = mode;
-      settings.samples = 2;
-      settings.flexibilities = std::move(flexibilities);
-      settings.range = range;
-      std::vector<LensBand> bands;
-      for (int i = 0; i < count; ++i) {
-        const double begin = range ? static_cast<double>(i) / count : static_cast<double>(i) / (count - 1),
-                     end = range ? (i + 1.0) / count : begin;
-        bands.push_back({begin, end, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
-      }
-      const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending,
-                                         {bench.receiver, bench.image, Vector3d::UnitZ()}, settings, Progress());
-      const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
-        std::fill(radiances, radiances + (last - first), rgb.x());
-      };
-      return draw_lens(light, bands, radiance, 1, true, Progress());
-    };
     constexpr int many = 256;
     std::vector<double> each;
     for (int i = 0; i < many; ++i) each.push_back(-0.1 + 0.2 * (i + 0.5) / many);
-    const LensPicture continuum = seen({-0.1, 0.1}, true, 8), single = seen(each, false, many);
+    const LensPicture continuum = picture_of(bench, mode, {-0.1, 0.1}, true, 8),
+                      single = picture_of(bench, mode, each, false, many);
     EXPECT_EQ(continuum.color.plane(0)[5], continuum.radiance.plane(0)[5]);
     int between = 0;
     for (int x = 0; x < 64; ++x) {
@@ -251,23 +184,6 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
     }
     EXPECT_GT(between, 10);
   }
-}
-
-/// A picture of one channel in the light of a range of flexibilities, which has equal bands.
-LensPicture picture_of_range(const Bench& bench, LensMode mode, const std::vector<double>& ends, int count) {
-  LensSettings settings = bench.settings;
-  settings.mode = mode;
-  settings.flexibilities = ends;
-  settings.range = true;
-  std::vector<LensBand> bands;
-  for (int i = 0; i < count; ++i)
-    bands.push_back({static_cast<double>(i) / count, (i + 1.0) / count, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
-  const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending,
-                                     {bench.receiver, bench.image, Vector3d::UnitZ()}, settings, Progress());
-  const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
-    std::fill(radiances, radiances + (last - first), rgb.x());
-  };
-  return draw_lens(light, bands, radiance, 1, true, Progress());
 }
 
 /// The edge of white light that turns aside lies elsewhere in each wavelength: a pixel has the part of the spectrum
@@ -283,7 +199,7 @@ TEST(Lens, AtATearPixelsHaveTheirPartOfEachBand) {
   };
   Bench bench(constant_field(T), plate_at(1.5, {3, 3}, {96, 96}), {3, 3}, uniform(1), Wrap::clamp);
   constexpr int count = 3;
-  const LensPicture seen = picture_of_range(bench, LensMode::scatter, {least, most}, count);
+  const LensPicture seen = picture_of(bench, LensMode::scatter, {least, most}, true, count);
   int partly = 0;
   for (int row = 0; row < 96; ++row) {
     const double y = 1.5 - (row + 0.5) * pixel;
@@ -318,8 +234,8 @@ TEST(Lens, PixelsAreTheMeanOfTheirPartsWhereTheMapBends) {
   coarse.settings.samples = n;
   coarse.bending = fine.bending = settings_of(BendingMethod::splitting, 0.5);
   // (Not of scatter, whose gaps at tears are a quarter of a pixel wide: they differ with the pixels.)
-  const LensPicture seen = picture_of_range(coarse, LensMode::gather, {0.05, 0.15}, 4),
-                    parts = picture_of_range(fine, LensMode::gather, {0.05, 0.15}, 4);
+  const LensPicture seen = picture_of(coarse, LensMode::gather, {0.05, 0.15}, true, 4),
+                    parts = picture_of(fine, LensMode::gather, {0.05, 0.15}, true, 4);
   double sum = 0;
   for (int y = 0; y < size; ++y)
     for (int x = 0; x < size; ++x) {
@@ -424,13 +340,6 @@ TEST(Lens, SettingsOutOfRangeAreRefused) {
   refused([](Bench& bench) { bench.image.texture = nullptr; });
   refused([](Bench& bench) { bench.bending.step = -1; });
   refused([](Bench& bench) { bench.bending.max_steps = 0; });
-}
-
-TEST(Lens, EveryEndHasAName) {
-  EXPECT_STREQ(to_string(LensEnd::image), "image");
-  EXPECT_STREQ(to_string(LensEnd::outside), "outside");
-  for (const RayEnd end : {RayEnd::missed, RayEnd::obstacle, RayEnd::step_limit, RayEnd::degenerate})
-    EXPECT_STREQ(to_string(static_cast<LensEnd>(end)), to_string(end));
 }
 
 }  // namespace

@@ -141,14 +141,5 @@ TEST(FieldPhotonsTest, AFloorWithinTheVolumeHasTheLightOfForwardRays) {
   EXPECT_GT(difference(truth.radiance, truth.power), 0.3);
 }
 
-/// Of a point in the volume.
-TEST(FieldPhotonsTest, APointWithinTheVolumeLightsItsFloorAsForwardRaysDo) {
-  const TensorField field = lens_field();
-  const OnFloor truth = rays_on_floor(field, point_rays);
-  for (const Conserve conserve : {Conserve::power, Conserve::radiance})
-    EXPECT_LT(difference(photons_on_floor(field, flexibility, conserve, point_within), truth.where(conserve)), 0.2);
-  EXPECT_GT(difference(photons_on_floor(field, -flexibility, Conserve::power, point_within), truth.power), 0.5);
-}
-
 }  // namespace
 }  // namespace tensorray

@@ -89,22 +89,6 @@ TEST(Fluence, OfStraightLightIsOneAtEveryVoxel) {
   }
 }
 
-TEST(Fluence, OfObliqueLightThroughASkewVolumeIsOne) {
-  Affine3d placement = Affine3d::Identity();
-  placement.linear() << 1, 0.3, 0, 0, 0.5, 0.2, 0.1, 0, 2;
-  placement.translation() = Vector3d(5, -3, 2);
-  const FluenceBench bench = make_bench(TensorField(cube_grid({12, 7, 9}, no_bending, placement)), {0.3, -0.5, -1});
-  const auto grids = distribute(bench, FluenceKind::all_light, 60000, BeamPattern::stratified).fluence;
-  ASSERT_EQ(grids.size(), 1u);
-  int voxels = 0;
-  for_each(grids[0], [&](const Vector3i& voxel, float value) {
-    // The error of stratified rays is the number of rays that graze the voxel: a few of the hundreds that cross it.
-    EXPECT_NEAR(value, 1, 0.15) << voxel.transpose();
-    ++voxels;
-  });
-  EXPECT_EQ(voxels, 12 * 7 * 9);
-}
-
 /// Σ power · length in the volume, of each channel, by tracing the same rays and recording their complete records.
 std::vector<double> lengths_by_channel(const FluenceBench& bench, std::uint64_t photons, BeamPattern pattern) {
   const BeamSampler positions(bench.beam, pattern, photons, 0);
@@ -162,19 +146,6 @@ TEST(Fluence, CountsLightThatIsStraightBesideACutAndMissesThePlate) {
              ++voxels;
            });
   EXPECT_EQ(voxels, 9 * 9 * 9);
-}
-
-TEST(Fluence, ASingleLayerOfVoxelsIsCrossedWhole) {
-  TensorField layer(dense_grid({Vector3i(0, 0, 3), Vector3i(8, 8, 3)}, Affine3d::Identity(),
-                               [](const Vector3i&) { return Matrix3d::Zero(); }));
-  const FluenceBench bench = make_bench(std::move(layer), {0, 0, -1});
-  int voxels = 0;
-  for_each(distribute(bench, FluenceKind::all_light, 64 * 64, BeamPattern::grid).fluence[0],
-           [&](const Vector3i&, float value) {
-             EXPECT_NEAR(value, 1, 1e-6);
-             ++voxels;
-           });
-  EXPECT_EQ(voxels, 81);
 }
 
 /// Blocks of 8³ voxels at the corners of a cube; with `filled`, zeros everywhere between them.
@@ -254,29 +225,6 @@ TEST(Fluence, IsTheSameOnAnyNumberOfThreads) {
       }
     }
   }
-}
-
-TEST(Fluence, SomeChannelsPerPhotonEstimateTheSame) {
-  const FluenceBench bench = make_bench(cube_field(9, linear_tensor), {0.2, 0.1, -1});
-  const auto all = distribute(bench, FluenceKind::bands, 20000, BeamPattern::stratified).fluence;
-  const auto some = distribute(bench, FluenceKind::bands, 20000, BeamPattern::stratified, 1).fluence;
-  for (std::size_t i = 0; i < all.size(); ++i)  // 7000 rays per channel, spread evenly.
-    EXPECT_NEAR(sum(bench.field, some[i]) / sum(bench.field, all[i]), 1, 0.01);
-}
-
-TEST(Fluence, ChangesNothingElse) {
-  const FluenceBench bench = make_bench(cube_field(9, linear_tensor), {0.2, 0.1, -1});
-  const PhotonDistribution with = distribute(bench, FluenceKind::bands, 2000, BeamPattern::stratified);
-  const PhotonDistribution without = distribute(bench, FluenceKind::none, 2000, BeamPattern::stratified);
-  EXPECT_TRUE(without.fluence.empty());
-  EXPECT_EQ(with.irradiance.values, without.irradiance.values);
-  EXPECT_EQ(with.ends, without.ends);
-  EXPECT_EQ(with.tensor_samples, without.tensor_samples);
-}
-
-TEST(Fluence, NeedsPower) {
-  const TensorField field = constant_field(Matrix3d::Zero());
-  EXPECT_THROW(FluenceSums(field, {0, 0}, true, 10), std::invalid_argument);
 }
 
 }  // namespace

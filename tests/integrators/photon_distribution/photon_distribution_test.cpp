@@ -52,21 +52,6 @@ std::uint64_t emitted(const EndCounts& counts) {
   return sum;
 }
 
-TEST(PhotonDistribution, UndisturbedLightIsUniform) {
-  const Bench bench = Bench::make(zero, 1.2, 64);  // The beam is wider than the plate.
-  PhotonSettings settings;
-  settings.pattern = BeamPattern::grid;
-  settings.photons = 40000;
-  const Film film = distribute(bench, channels(2), settings).irradiance;
-  // The mean differs from 1 only by the number of lattice points on the plate. The spread comes from the estimator.
-  double mean = 0;
-  for (const double value : film.values) mean += value / static_cast<double>(film.values.size());
-  EXPECT_NEAR(mean, 1, 0.02);
-  const auto middle = [&](int x, int y) { return film.plane(0)[64 * (16 + y) + 16 + x]; };
-  for (int y = 0; y < 32; ++y)
-    for (int x = 0; x < 32; ++x) ASSERT_NEAR(middle(x, y) / middle(0, 0), 1, 1e-6);
-}
-
 TEST(PhotonDistribution, EveryRayIsAccountedFor) {
   Surfaces extra;
   extra.obstacles.push_back(
@@ -166,54 +151,6 @@ TEST(PhotonDistribution, InColourItIsTheChannelsColoured) {
   EXPECT_THROW(distribute(bench, channels(8), settings), std::invalid_argument);
 }
 
-TEST(PhotonDistribution, NeighboursFollowEachOther) {
-  const Bench bench = Bench::make(zero, 2.5, 16);
-  PhotonSettings settings;
-  settings.photons = 64 * 64;
-  settings.keep_photons = true;
-  for (const BeamPattern pattern : {BeamPattern::grid, BeamPattern::sobol, BeamPattern::random}) {
-    settings.pattern = pattern;
-    const std::vector<PlatePhoton> photons = distribute(bench, channels(1), settings).photons;
-    ASSERT_GT(photons.size(), 3500u);
-    // Sixteen successive positions on a Morton curve fill a square of 4 by 4 of the 64 by 64 positions, or two halves
-    // of such squares. In the order of rows they would span a quarter of the beam's width, and in random order nearly
-    // all of it.
-    int small = 0, groups = 0;
-    for (std::size_t first = 0; first + 16 <= photons.size(); first += 16, ++groups) {
-      Eigen::AlignedBox3f box;
-      for (std::size_t i = first; i < first + 16; ++i) box.extend(photons[i].origin);
-      small += box.sizes().maxCoeff() < 0.15 * 2;
-    }
-    EXPECT_GT(small, 0.75 * groups);
-  }
-}
-
-TEST(PhotonDistribution, AConstantFieldShiftsTheBeam) {
-  // T V = (k, 0, 0) for V = −z: all rays bend alike, and the beam lands where a single ray does.
-  Matrix3d T = Matrix3d::Zero();
-  T(0, 2) = -1;
-  const Bench bench = Bench::make([&](const Vector3d&) { return T; }, 6, 60);
-  PhotonSettings settings;
-  settings.photons = 2000;
-  const std::vector<LightChannel> light = channels(3);
-  const PhotonDistribution result = distribute(bench, light, settings);
-  double last = 0;
-  for (int channel = 0; channel < 3; ++channel) {
-    double moment = 0, sum = 0;
-    for (int y = 0; y < 60; ++y)
-      for (int x = 0; x < 60; ++x) {
-        const double value = result.irradiance.plane(channel)[60 * y + x];
-        moment += value * (0.1 * (x + 0.5) - 3);
-        sum += value;
-      }
-    const Ray ray = trace_one(bench.field, bench.geometry, {}, {0, 0, 3}, {0, 0, -1}, light[channel].flexibility);
-    // Rays that leave through the side bend a little less: they pull the mean by less than a tenth of the shift.
-    EXPECT_NEAR(moment / sum, ray.position.x(), 0.1 * std::abs(ray.position.x()));
-    EXPECT_GT(moment / sum, last);
-    last = moment / sum;
-  }
-}
-
 TEST(PhotonDistribution, KeepsPhotonsIfAsked) {
   const Bench bench = Bench::make(linear_tensor, 2.5, 32);
   PhotonSettings settings;
@@ -255,18 +192,6 @@ TEST(PhotonDistribution, StopsWhenCancelledAndReportsProgress) {
     if (done > 0) progress.cancelled = true;
   };
   EXPECT_THROW(distribute_photons(bench.field, bench.geometry, bench.beam, channels(1), settings, progress), Cancelled);
-}
-
-TEST(PhotonDistribution, RefusesSettingsOutOfRange) {
-  const Bench bench = Bench::make(zero, 1.2, 16);
-  PhotonSettings settings;
-  settings.photons = 10;
-  EXPECT_THROW(distribute(bench, {}, settings), std::invalid_argument);
-  settings.channels_per_photon = 3;
-  EXPECT_THROW(distribute(bench, channels(4), settings), std::invalid_argument);
-  settings = {};
-  settings.photons = 0;
-  EXPECT_THROW(distribute(bench, channels(4), settings), std::invalid_argument);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "integrators/photon_distribution/photon_distribution.h"
-#include "integrators/photon_distribution/photon_sums.h"
+#include "integrators/photon_distribution/photon_chunks.h"
 #include "tests/base/rank_support.h"
 #include "tests/tracing/support.h"
 

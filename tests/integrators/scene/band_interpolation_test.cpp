@@ -45,41 +45,6 @@ std::vector<BentRay> parabolic_ends() {
   return ways;
 }
 
-TEST(BandInterpolationTest, GroupsAreTheRaysThatAllowIt) {
-  std::vector<BentRay> ways = ways_of({0, 0, 0}, {0, 0, 1}, 1e-3);
-  const auto add = [&](const std::vector<BentRay>& more) { ways.insert(ways.end(), more.begin(), more.end()); };
-  add(ways_of({0, 0, 0}, {0, 1, 1}, 0));        // Exact.
-  add(ways_of({1, 0, 0}, {0, 1, 1}, 1e-3, 8));  // Too few.
-  add(ways_of({0, 0, 0}, {0, 1, 1}, 1e-3, 1));
-  const std::vector<BandGroup> groups = interpolation_groups(ways);
-  ASSERT_EQ(groups.size(), 2u);
-  EXPECT_EQ(groups[0].first, 0u);
-  EXPECT_EQ(groups[0].nodes.size(), 3u);
-  EXPECT_EQ(groups[1].first, 20u);
-  EXPECT_EQ(groups[1].nodes.size(), 6u);
-  for (const BandGroup& group : groups) {
-    EXPECT_EQ(group.nodes.front(), group.first);
-    EXPECT_EQ(group.nodes.back(), group.first + group.count - 1);
-    for (const std::size_t node : group.nodes) EXPECT_NE(node, group.check);
-    EXPECT_TRUE(group.is_traced(group.check));
-  }
-}
-
-TEST(BandInterpolationTest, PolynomialsAreExact) {
-  const std::vector<BentRay> truth = parabolic_ends();
-  const BandGroup group = interpolation_groups(ways_of({0, 0, 0}, {0, 0, 1}, 1e-6))[0];
-  EXPECT_TRUE(is_predictable(group, truth, {0, 0, 0}));
-  std::vector<BentRay> ways = truth;
-  for (std::size_t i = 0; i < ways.size(); ++i)
-    if (!group.is_traced(i)) ways[i] = BentRay{ways[i].band};
-  interpolate(group, ways);
-  for (std::size_t i = 0; i < ways.size(); ++i) {
-    EXPECT_TRUE(ways[i].arrives);
-    EXPECT_LT((ways[i].position - truth[i].position).norm(), 1e-12);
-    EXPECT_NEAR(ways[i].jacobian, truth[i].jacobian, 1e-12);
-  }
-}
-
 TEST(BandInterpolationTest, TheCheckSeesWhatIsNotPredictable) {
   const BandGroup group = interpolation_groups(ways_of({0, 0, 0}, {0, 0, 1}, 1e-6))[0];
   for (const int what : {0, 1, 2}) {

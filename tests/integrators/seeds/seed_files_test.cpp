@@ -1,4 +1,4 @@
-#include "integrators/seeds/seed_files.h"
+#include "integrators/seeds/seeds.h"
 
 #include <gtest/gtest.h>
 

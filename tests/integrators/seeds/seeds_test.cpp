@@ -96,15 +96,5 @@ TEST(Seeds, ASphereIsFilledEvenly) {
   EXPECT_LT(mean.norm(), 0.01);  // Independent points: 2 √(3/5) / √4096 = 0.024.
 }
 
-TEST(Seeds, RefusesNothingAndTooMuch) {
-  const Beam beam = hexagonal_beam();
-  EXPECT_THROW(grid_seeds(beam, 0), std::invalid_argument);
-  EXPECT_THROW(poisson_disk_seeds(beam, 0, 1), std::invalid_argument);
-  EXPECT_THROW(poisson_disk_seeds(beam, 10'000'001, 1), std::invalid_argument);
-  EXPECT_THROW(line_seeds({0, 0, 0}, {1, 0, 0}, 0), std::invalid_argument);
-  EXPECT_THROW(sphere_seeds({0, 0, 0}, 0, 1, 1), std::invalid_argument);
-  EXPECT_THROW(sphere_seeds({0, 0, 0}, 1, 0, 1), std::invalid_argument);
-}
-
 }  // namespace
 }  // namespace tensorray

@@ -34,21 +34,6 @@ double stretch_at(const TensorField& field, const StretchSettings& settings, con
                    {start})[0];
 }
 
-TEST(Stretch, OfStraightLightIsZero) {
-  const TensorField field = constant_field(Matrix3d::Zero());
-  for (const Vector3d& start : {Vector3d(0, 0, 0), Vector3d(0.4, -0.9, 0.7), Vector3d(0.1, 0.2, 3)})
-    EXPECT_NEAR(stretch_at(field, along_minus_z(5), start), 0, 1e-7);
-}
-
-/// All light turns alike everywhere: the distances between neighbours do not change.
-TEST(Stretch, OfRotationIsZero) {
-  Matrix3d rotation;
-  rotation << 0, -0.4, 0.7, 0.4, 0, 0.9, -0.7, -0.9, 0;
-  const TensorField field = constant_field(rotation);
-  for (const Vector3d& start : {Vector3d(0, 0, 0.4), Vector3d(-0.2, 0.1, 0.2)})
-    EXPECT_NEAR(stretch_at(field, along_minus_z(0.7), start), 0, 1e-7);
-}
-
 /// T_xz = −c x: light along −z obeys x'' = s c x near x = 0, so that a distance grows as cosh(√(s c) L) if c > 0, and
 /// oscillates if c < 0. A distance along y does not change.
 Matrix3d lens_tensor(const Vector3d& p, double c) {
@@ -64,12 +49,6 @@ TEST(Stretch, OfADivergingFieldIsThatOfTheHyperbolicCosine) {
     // The relative error of splitting is a fraction of (√3 h)²/12, h = 1/64.
     EXPECT_NEAR(stretch_at(field, along_minus_z(length, 0.5), {0, 0.2, 0.9}), expected, 2e-4 * expected) << length;
   }
-}
-
-TEST(Stretch, OfAConvergingFieldIsZeroAcrossIt) {
-  const TensorField field = cube_field(17, [](const Vector3d& p) { return lens_tensor(p, -6); });
-  for (const double length : {0.5, 1.6})
-    EXPECT_NEAR(stretch_at(field, along_minus_z(length, 0.5), {0, 0.2, 0.9}), 0, 1e-6);
 }
 
 /// Behind the volume, distances grow with the difference of directions: cosh k d + k (L − d) sinh k d.
@@ -168,18 +147,6 @@ TEST(Stretch, PictureIsOfThePixelsMiddles) {
     }
 }
 
-TEST(Stretch, IsTheSameOnAnyNumberOfThreads) {
-  const TensorField field = cube_field(9, linear_tensor);
-  const Geometry geometry(surfaces_of(field));
-  const auto on_threads = [&](int threads) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return stretch_grid(field, geometry, {}, along_minus_z(1), 20, Progress());
-  };
-  const ScalarGrid one = on_threads(1), many = on_threads(4);
-  ASSERT_EQ(one.blocks.size(), many.blocks.size());
-  for (std::size_t i = 0; i < one.blocks.size(); ++i) EXPECT_EQ(one.blocks[i].values, many.blocks[i].values);
-}
-
 TEST(Stretch, RefusesSettingsOutOfRangeAndStopsWhenCancelled) {
   const TensorField field = constant_field(Matrix3d::Zero());
   const Geometry geometry(surfaces_of(field));
@@ -190,36 +157,6 @@ TEST(Stretch, RefusesSettingsOutOfRangeAndStopsWhenCancelled) {
   EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(1), 1, progress), std::invalid_argument);
   progress.cancelled = true;
   EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(1), 9, progress), Cancelled);
-}
-
-/// The greatest length ends rays before the volume, in it and behind it, but not behind a surface that they meet.
-TEST(GreatestLength, EndsRaysWhereverTheyAre) {
-  const TensorField field = cube_field(9, linear_tensor);
-  Surfaces surfaces = surfaces_of(field);
-  surfaces.plate = plate_across({0, 0, -1}, 3);
-  const Geometry geometry(surfaces);
-  for (const BendingMethod method : {BendingMethod::euler, BendingMethod::splitting, BendingMethod::dopri5})
-    for (const double length : {0.5, 1.7, 4.2}) {
-      BendingSettings settings = settings_of(method, 0.3);
-      settings.max_length = length;
-      RayBatch batch;
-      batch.add({0.1, 0.2, 2}, {0, 0, -1}, 0.1);
-      std::vector<RayRecord> records;
-      trace(field, geometry, settings, batch, &records);
-      EXPECT_EQ(batch.end[0], RayEnd::missed);
-      EXPECT_NEAR(batch.length[0], length, 1e-12);
-      const PathPoint last = path_point(field, records[0], records[0].size() - 1);
-      EXPECT_EQ(last.length, batch.length[0]);
-      EXPECT_EQ(last.position, batch.position[0]);
-    }
-  BendingSettings settings;
-  settings.max_length = 9;
-  RayBatch batch;
-  batch.add({0.1, 0.2, 2}, {0, 0, -1}, 0.1);
-  trace(field, geometry, settings, batch);
-  EXPECT_EQ(batch.end[0], RayEnd::plate);
-  settings.max_length = 0;
-  EXPECT_THROW(trace(field, geometry, settings, batch), std::invalid_argument);
 }
 
 }  // namespace

@@ -119,34 +119,6 @@ TEST_F(Grids, FluenceIsAFogVolumeInTheFieldsVoxelsOfEachBandIfAsked) {
   EXPECT_EQ(grid_names("f.vdb"), (std::vector<std::string>{"fluence", "fluence_blue", "fluence_green", "fluence_red"}));
 }
 
-TEST_F(Grids, FluenceIsOfPhotonsAlone) {
-  write("scene.json", small_scene());
-  expect_wrong_input({"render", "scene.json", "-q", "-o", "a.fluence.vdb", "--set", "integrator.type=lens"},
-                     {"/output/fluence", "lens makes no fluence"});
-  expect_wrong_input({"render", "scene.json", "-q", "--set", "output.fluence=a.png"}, {"/output/fluence", ".vdb"});
-  expect_wrong_input({"render", "scene.json", "-q", "-o", "a.vdb", "--stats", "b.fluence.vdb", "-o", "b.fluence.vdb"},
-                     {"--stats", "b.fluence.vdb"});
-}
-
-TEST_F(Grids, StretchIsAGridAndAPicture) {
-  write("scene.json", small_scene());
-  run_well({"render", "scene.json", "-q", "-o", "a.vdb", "-o", "a.png", "-o", "a.exr", "--set",
-            R"(integrator={"type": "stretch", "stretch": {"resolution": 12, "pixels": 40}})"});
-  const auto grid = read_grid("a.vdb", "stretch");
-  EXPECT_EQ(grid->evalActiveVoxelBoundingBox().dim().x(), 12);
-  EXPECT_EQ(text(*grid, "tensorray:units"), "1/length");
-  float greatest = 0;
-  for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel) greatest = std::max(greatest, *voxel);
-  EXPECT_GT(greatest, 0.01f);
-  const Image image = read_image(in_folder("a.exr"));
-  EXPECT_EQ(image.width, 40);
-  EXPECT_EQ(std::count(image.channels.begin(), image.channels.end(), "stretch"), 1);
-
-  expect_wrong_input({"render", "scene.json", "-q", "-o", "c.vdb", "--set", "integrator.type=stretch", "--set",
-                      "integrator.stretch.wavelength=500", "--set", "bending.rgb=[0.1,0.2,0.3]"},
-                     {"rgb"});
-}
-
 TEST_F(Grids, PythonReadsThem) {
   run_well({"make", "vortex", "-o", "t.vdb", "--resolution", "9"});
   run_well({"derive", "t.vdb", "--invariant", "vorticity", "-o", "i.vdb"});

@@ -8,36 +8,6 @@ namespace {
 
 using namespace test;
 
-TEST_F(Import, NotchWhoseMidSideNodesHoldNothing) {
-  const std::string folder = data_file("notch_stress");
-  SKIP_WITHOUT(folder);
-  const auto arguments = [&](const char* file) {
-    return Arguments{folder + file, "--array", "Nodal Stress", "--order", "vtk", "--voxel-size", "0.002"};
-  };
-  const json notch = import(arguments("/notch_stress.vtk"), "notch");
-  // On the mesh the eigenvalues reach from -3.402e5 to 8.1078e6. No warning means that the grid has 95% of that.
-  EXPECT_EQ(imported_.error, "");
-  EXPECT_GT(at(notch, "eigenvalues", "real_max"), 0.94 * 8.1078e6);
-  EXPECT_LE(at(notch, "eigenvalues", "real_max"), 8.1078e6);
-  EXPECT_GE(at(notch, "eigenvalues", "real_min"), -3.4021e5);
-  EXPECT_EQ(notch["asymmetry"], 0);
-  EXPECT_EQ(notch["name"], "Nodal Stress");
-  expect_extent(notch, Vector3d::Zero(), Vector3d(0.4, 0.1, 0.01), 0.004);
-  import(arguments("/notch_stress_fixed.vtk"), "fixed");
-  expect_same(field("notch"), field("fixed"));
-}
-
-TEST_F(Import, BrainWithItsBackgroundNotANumber) {
-  const std::string file = data_file("nan/brain_nan_background.vti");
-  SKIP_WITHOUT(file);
-  const json brain = import({file}, "brain");
-  EXPECT_EQ(brain["name"], "diffusion_tensor");
-  EXPECT_EQ(brain["active_voxels"], 93524);
-  EXPECT_EQ(brain["non_finite_voxels"], 0);
-  EXPECT_NE(imported_.out.find("367276 not finite"), std::string::npos) << imported_.out;
-  EXPECT_NEAR(at(brain, "eigenvalues", "negative_fraction") * 93524, 864, 0.01);
-}
-
 TEST_F(Import, PointLoadIsBoussinesqs) {
   const std::string file = data_file("pointload/pointload_32.vti");
   SKIP_WITHOUT(file);
@@ -51,22 +21,6 @@ TEST_F(Import, PointLoadIsBoussinesqs) {
     ASSERT_NEAR(stress(2, 2), pressed, 1e-6 * (1 + std::abs(pressed)));  // r.z() <= 0: pressure is negative.
     ASSERT_NEAR(stress(0, 2) * r.z(), pressed * r.x(), 1e-5 * (1 + std::abs(pressed)));
   });
-}
-
-TEST_F(Import, DiffusionThatDoesNotSayItsOrder) {
-  const std::string file = data_file("dmri_crop/tensor.nii.gz");
-  SKIP_WITHOUT(file);
-  refuses({file}, 2, {"--order", "mrtrix"});
-  const json crop = import({file, "--order", "mrtrix", "--name", "water", "--units", "mm2/s"}, "crop");
-  EXPECT_EQ(crop["active_voxels"], 16 * 16 * 5);
-  EXPECT_NEAR(at(crop, "eigenvalues", "real_min"), 1.5e-4, 5e-6);
-  EXPECT_NEAR(at(crop, "eigenvalues", "real_max"), 1.7e-3, 5e-5);
-  EXPECT_EQ(crop["name"], "water");
-  EXPECT_EQ(crop["metadata"]["tensorray:field"], "water");
-  EXPECT_EQ(crop["metadata"]["tensorray:units"], "mm2/s");
-  EXPECT_EQ(imported_.error, "");
-  import({file, "--order", "fsl"}, "wrong");
-  EXPECT_NE(imported_.error.find("of the voxels have a negative eigenvalue"), std::string::npos) << imported_.error;
 }
 
 TEST_F(Import, BluntFinWhoseBoundaryLayerIsThinnerThanAVoxel) {

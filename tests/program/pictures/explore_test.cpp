@@ -53,18 +53,6 @@ TEST_F(Explore, ThePicturesAreThoseOfTheirScenes) {
   }
 }
 
-TEST_F(Explore, RowsAreScalesAndColumnsAreDirections) {
-  const auto picked = [&](int number) {
-    EXPECT_EQ(explore({"--pick", std::to_string(number), "--save-scene", "cell.json"}).status, 0);
-    return read_json("cell.json");
-  };
-  const json first = picked(6), third = picked(18), other = picked(3);
-  EXPECT_EQ(first["light"]["direction"], json::array({0, 0, -1}));
-  EXPECT_EQ(third["light"]["direction"], json::array({0, 0, -1}));
-  EXPECT_EQ(other["light"]["direction"], json::array({0, 1, 0}));
-  EXPECT_NEAR(third["field"]["scale"].get<double>(), 4 * first["field"]["scale"].get<double>(), 1e-9);
-}
-
 /// Several depths of a lens are side by side, and the stretch has pixels of its own.
 TEST_F(Explore, PicturesOfOtherMethodsStayInTheirCells) {
   for (const std::vector<std::string>& method : std::vector<std::vector<std::string>>{

@@ -45,15 +45,6 @@ TEST_F(FieldAlone, IsRenderedWithDefaultsAndTheSceneIsToldAndSaved) {
   EXPECT_EQ(read_image(in_folder("alone.exr")).pixels, read_image(in_folder("again.exr")).pixels);
 }
 
-TEST_F(FieldAlone, OtherMethodsAndCommandsTakeIt) {
-  run_well(with_small({"render", "stress.vdb", "--set", "integrator.type=lens", "-o", "lens.png", "-q"}));
-  run_well({"render", "stress.vdb", "--set", "integrator.type=stretch", "--set", "integrator.stretch.pixels=16", "-o",
-            "stretch.png", "-q"});
-  const Outcome quiet = run_well(with_small({"render", "stress.vdb", "-q"}));
-  EXPECT_EQ(quiet.error, "");
-  EXPECT_TRUE(has("stress.png") && has("stress.exr"));
-}
-
 TEST_F(FieldAlone, NothingIsOverwrittenOrMadeWrong) {
   const std::string field = read_file(in_folder("stress.vdb"));
   expect_error("--save-scene", {"render", "stress.vdb", "-q", "--save-scene", "stress.vdb"});

@@ -26,20 +26,6 @@ TEST_F(Program, QuietPrintsNothing) {
   EXPECT_EQ(outcome.out + outcome.error, "");
 }
 
-TEST_F(Program, OutputOptionsTakeThePlaceOfTheScenes) {
-  write("scene.json", small_scene());
-  run_well({"render", "scene.json", "-o", "a.png", "-o", "b.spectral.exr", "-o", "c.vdb", "-o", "d.exr"});
-  EXPECT_EQ(files(), (std::vector<std::string>{"a.png", "b.spectral.exr", "c.vdb", "d.exr", "scene.json"}));
-  const Image spectral = read_image(in_folder("b.spectral.exr"));
-  ASSERT_EQ(spectral.channels.size(), 3u + 4u);
-  for (const double wavelength : {423.75, 511.25, 598.75, 686.25}) {
-    char name[32];
-    std::snprintf(name, sizeof name, "S0.%d,%06dnm", static_cast<int>(wavelength),
-                  static_cast<int>(std::lround(1e6 * (wavelength - std::floor(wavelength)))));
-    EXPECT_EQ(std::count(spectral.channels.begin(), spectral.channels.end(), name), 1) << name;
-  }
-}
-
 /// Of all options, these change the bytes in no way, or in all.
 TEST_F(Program, ThreadsDoNotChangeTheFilesAndTheSeedDoes) {
   write("scene.json", small_scene());
@@ -75,24 +61,6 @@ TEST_F(Program, FilesGoThroughMakeInfoAndRender) {
   write("scene.json", small_scene(R"({"generate": {"kind": "vortex", "resolution": 16, "circulation": 3}})"));
   run_well({"render", "scene.json", "-q"});
   EXPECT_EQ(read_image(in_folder("scene.exr")).pixels, from_file);
-}
-
-/// A row of a tensor is a vector grid: without the others it is no tensor, but has a gradient.
-TEST_F(Program, GridsWithoutATensorAreDerived) {
-  using nlohmann::json;
-  run_well({"make", "vortex", "-o", "vortex.vdb", "--resolution", "16"});
-  run_well({"derive", "vortex.vdb", "--invariant", "norm", "-o", "norm.vdb"});
-  const std::string error = run({"render", "norm.vdb", "-o", "a.png"}).error;
-  EXPECT_NE(error.find("`--set field.derive=hessian` makes one of"), std::string::npos) << error;
-  EXPECT_NE(run_well({"info", "norm.vdb"}).out.find("--derive hessian"), std::string::npos);
-  const json hessian = json::parse(run_well({"info", "norm.vdb", "--derive", "hessian", "--json"}).out);
-  EXPECT_EQ(hessian["fields"][0]["active_voxels"], 4096);
-  const std::string row = "vortex_row0";
-  const json gradient =
-      json::parse(run_well({"info", "vortex.vdb", "--field", row, "--derive", "gradient", "--json"}).out);
-  EXPECT_EQ(gradient["fields"][0]["name"], row);
-  write("scene.json", small_scene(R"({"file": "missing.####.vdb"})"));
-  EXPECT_NE(run({"render", "scene.json"}).error.find("give --frames"), std::string::npos);
 }
 
 TEST_F(Program, AnInterruptLeavesNothingBehind) {

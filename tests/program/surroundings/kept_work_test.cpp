@@ -122,17 +122,6 @@ INSTANTIATE_TEST_SUITE_P(Methods, DividedWork,
                                          plate_scene(R"({"type": "photon_distribution", "density": {"error": 0.5}})"),
                                          plate_scene(lens), plate_scene(stretch)));
 
-/// Files beside the picture, which the scene of the shards asks for.
-TEST_F(KeptWork, ShardsOfPhotonsMergeToTheSameFiles) {
-  make(plate_scene(R"({"type": "photon_distribution"})", 4000));
-  run_well({"render", "scene.json", "-q", "-o", "whole.vtp", "-o", "whole.fluence.vdb"});
-  for (int i = 1; i <= 2; ++i)
-    run_well({"render", "scene.json", "-q", "--shard", fmt::format("{}/2", i), "-o", shard(i), "--set",
-              "output.photons=p.vtp", "--set", "output.fluence=p.fluence.vdb"});
-  run_well({"merge", "-q", "1.shard", "2.shard", "-o", "a.vtp", "-o", "a.fluence.vdb"});
-  EXPECT_TRUE(is_equal("a.vtp", "whole.vtp") && is_equal("a.fluence.vdb", "whole.fluence.vdb"));
-}
-
 /// The first shard has it; others may take it from there, and merge does.
 TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
   make(lit_scene);
@@ -250,19 +239,6 @@ TEST_F(KeptWork, AShardIsAnOutputLikeOthers) {
   arguments.insert(arguments.end(), {"--stats", "3.shard.checkpoint"});
   expect_error("the checkpoint", arguments);
   expect_error("the checkpoint", render("a", {"--stats", "a.png.checkpoint"}));
-}
-
-TEST_F(KeptWork, AShardContinues) {
-  make_shards(2);
-  const std::string whole = read_file(in_folder("2.shard"));
-  std::filesystem::remove(in_folder("2.shard"));
-  std::vector<std::string> arguments{"render", "scene.json", "-q",           "--shard", "2/2",
-                                     "-o",     "2.shard",    "--checkpoint", "0.01"};
-  EXPECT_EQ(end_by(SIGKILL, "2.shard.checkpoint", arguments).status, 128 + SIGKILL);
-  expect_error("missing shard 2/2", merge({"1.shard"}));
-  arguments.push_back("--resume");
-  run_well(arguments);
-  EXPECT_TRUE(read_file(in_folder("2.shard")) == whole);
 }
 
 /// A frame that was interrupted has files, which are not its picture.

@@ -112,19 +112,6 @@ TEST_F(RanksProgram, GiveTheFilesOfOneProcess) {
   }
 }
 
-/// Ranks of a machine map the same bricks, and leave nothing in the temporary folder.
-TEST_F(RanksProgram, HaveOneFieldWithinABoundOfMemory) {
-  write("scene.json", small_scene(R"({"generate": {"kind": "vortex", "resolution": 60}})"));
-  run_well({"render", "scene.json", "-q", "-o", "one.exr"});
-  std::filesystem::create_directory(in_folder("tmp"));
-  setenv("TMPDIR", in_folder("tmp").c_str(), 1);
-  render_with_ranks(3, "-q -o a.exr --threads 1 --memory 256M --stats stats.json");
-  unsetenv("TMPDIR");
-  expect_same("a.exr", "one.exr");
-  for (const auto& entry : std::filesystem::directory_iterator(in_folder("tmp")))
-    EXPECT_NE(entry.path().filename().string().rfind("tensorray-", 0), 0u) << entry.path();
-}
-
 /// Each rank renders every so many; those that fail are named once.
 TEST_F(RanksProgram, DivideTheFramesOfASequence) {
   write("scene.json", R"({"field": {"file": "field.vdb"}, "integrator": {"type": "photon_distribution"},

@@ -150,17 +150,6 @@ TEST(DirectLightTest, OcclusionHidesWhatIsBehind) {
   EXPECT_NEAR(mean.mean(), polygon_irradiance(half, {0, 0, 0}, {0, 0, 1}) / pi, 4 * mean.error());
 }
 
-TEST(DirectLightTest, ParallelLightHasTheCosineOnEverySide) {
-  const DirectionalLight sun{{1, 0, -1}, even(2), 0};
-  const World world({surface_of(floor_mesh(10))}, {make_material(Diffuse{}, grey(0.5))}, {sun});
-  for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material}) {
-    ShadingSettings settings;
-    settings.direct = direct;
-    EXPECT_NEAR(seen(world, settings, {0, 0, 3}, {1, 1, 0}, 4).mean(), 0.5 / pi * 2 * std::sqrt(0.5), 1e-6);
-    EXPECT_EQ(seen(world, settings, {0, 0, -3}, {1, 1, 0}, 4).mean(), 0);  // No light passes through.
-  }
-}
-
 TEST(MultipleImportanceSamplingTest, HasTheMeanOfEachStrategy) {
   const AreaLight small{rectangle_mesh({0, 0.5, 2}, {1, 0, 0}, {0, -1, 0}, {0.6, 0.6}), even(20)};
   const AreaLight large{rectangle_mesh({-2, 0, 1.5}, {0, 1, 0}, {0, 0, 1}, {3, 2.9}), even(1)};
@@ -184,19 +173,6 @@ TEST(MultipleImportanceSamplingTest, HasTheMeanOfEachStrategy) {
     }
     EXPECT_LT(both.error(), 0.02 * both.mean());
   }
-}
-
-TEST(IndirectClampTest, LimitsWhatIsScatteredTwiceOnly) {
-  const TriangleMesh box = room({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)});
-  const World world({surface_of(box, 0, 0)}, {make_material(Diffuse{}, grey(0.5))}, {AreaLight{box, even(8)}});
-  ShadingSettings settings;
-  settings.direct = DirectLight::material;  // Each contribution is 8 / 2^depth.
-  settings.roulette_depth = 100;
-  settings.max_depth = 3;
-  settings.indirect_clamp = 0.5;
-  EXPECT_NEAR(seen(world, settings, {0.2, 0.1, 0.3}, {1, 0.2, 0.5}, 8).mean(), 8 + 4 + 0.5 + 0.5, 1e-6);
-  settings.indirect_clamp = 0;
-  EXPECT_NEAR(seen(world, settings, {0.2, 0.1, 0.3}, {1, 0.2, 0.5}, 8).mean(), 8 + 4 + 2 + 1, 1e-6);
 }
 
 TEST(ShadingNormalTest, SmoothSpheresHaveNoFringesAndDoNotLeak) {
@@ -293,31 +269,6 @@ TEST(PictureTest, DoesNotDependOnTheNumberOfThreads) {
     pictures.push_back(render_surfaces(world.scene, camera(48), settings));
   }
   for (const SurfacePicture& picture : pictures) expect_same(picture, pictures[0]);
-}
-
-TEST(PictureTest, PassesAddUpToThePictureThatOnePassMakes) {
-  const World world = still_life();
-  PathTracerSettings settings;
-  settings.min_samples = settings.max_samples = 12;
-  const SurfacePicture at_once = render_surfaces(world.scene, camera(20), settings);
-  settings.min_samples = 5;
-  settings.pass_samples = 4;
-  std::uint64_t last_done = 0, last_total = 0;
-  RenderCallbacks callbacks;
-  callbacks.progress = [&](std::uint64_t done, std::uint64_t total) {
-    EXPECT_GE(done, last_done);
-    last_done = done;
-    last_total = total;
-  };
-  const SurfacePicture passed = render_surfaces(world.scene, camera(20), settings, callbacks);
-  EXPECT_EQ(samples_of(passed), std::vector<int>(20 * 20, 12));
-  EXPECT_EQ(last_total, 20u * 20 * 12);
-  for (std::size_t i = 0; i < at_once.radiance.values.size(); ++i)
-    EXPECT_NEAR(passed.radiance.values[i], at_once.radiance.values[i], 1e-12);
-
-  struct Stop {};
-  callbacks.progress = [](std::uint64_t, std::uint64_t) { throw Stop(); };
-  EXPECT_THROW(render_surfaces(world.scene, camera(20), settings, callbacks), Stop);
 }
 
 /// Without time, each pixel gets its first samples, whoever renders its tile; with more time than it takes, it gets
@@ -457,15 +408,6 @@ TEST(PictureTest, AuxiliaryPlanesAreThoseOfTheFirstSurface) {
       EXPECT_EQ(pixel.force.value[0], 2);
       EXPECT_GT(pixel.depth.value[0], 4.9);
     }
-}
-
-TEST(PictureTest, ColorsAreThoseThatWereAskedFor) {
-  BandValues reflectance(3);
-  for (const Vector3f& color :
-       {Vector3f(0.3f, 0.7f, 0.11f), Vector3f(0, 0, 0), Vector3f(1, 1, 1), Vector3f(0.9f, 0.2f, 0.6f)}) {
-    colors().reflectance(color, reflectance);
-    EXPECT_LT((colors().color(reflectance) - color).norm(), 2e-3) << color.transpose();
-  }
 }
 
 TEST(PictureTest, WhatIsMissingIsNamed) {

@@ -27,16 +27,6 @@ double integrate(const PixelFilter& filter, double from, double to) {
   return sum * (to - from) / steps;
 }
 
-TEST(PixelFilter, IsNormalized) {
-  for (const PixelFilterShape shape : all_shapes)
-    for (const double radius : {0.5, 1.5, 3.0}) {
-      const PixelFilter filter(shape, radius);
-      EXPECT_NEAR(filter.density({0, 0}) * std::pow(integrate(filter, -radius, radius), 2), 1, 1e-6);
-      EXPECT_EQ(filter.density({1.001 * radius, 0}), 0);
-      EXPECT_EQ(filter.density({0, -1.001 * radius}), 0);
-    }
-}
-
 TEST(PixelFilter, HasTheNamedShape) {
   const PixelFilter box(PixelFilterShape::box), gaussian(PixelFilterShape::gaussian),
       harris(PixelFilterShape::blackman_harris);

@@ -31,32 +31,6 @@ Eigen::AlignedBox2i drawn_box(const Image& image, float value) {
   return box;
 }
 
-TEST(InkTest, CoverageIsTheSharedPartOfPixelAndLine) {
-  EXPECT_DOUBLE_EQ(line_coverage(0, 3), 1);
-  EXPECT_DOUBLE_EQ(line_coverage(0.3, 0.4), 0.4);
-  EXPECT_DOUBLE_EQ(line_coverage(0.6, 0.4), 0.1);
-  EXPECT_DOUBLE_EQ(line_coverage(1, 1.5), 0.25);
-  EXPECT_DOUBLE_EQ(line_coverage(-1, 1.5), 0.25);
-  EXPECT_DOUBLE_EQ(line_coverage(1.25, 1.5), 0);
-  EXPECT_DOUBLE_EQ(line_coverage(100, 1.5), 0);
-  EXPECT_DOUBLE_EQ(line_coverage(0, 0), 0);
-  for (const double width : {0.2, 1.0, 1.5, 4.7})
-    for (const double phase : {0.0, 0.25, 0.41, 0.9}) {
-      double sum = 0;
-      for (int x = -10; x <= 10; ++x) sum += line_coverage(x + phase, width);
-      EXPECT_NEAR(sum, width, 1e-12);
-    }
-}
-
-TEST(InkTest, LayingOverBlendsThreeChannelsAndAlpha) {
-  Image image(2, 1, {"Y", "A"});
-  lay_over(image, 1, 0, {0.5, 0.7, 0.9}, 0.5);
-  EXPECT_EQ(image.pixels, (std::vector<float>{0, 0, 0.25f, 0.5f}));
-  Image many(1, 1, {"R", "G", "B", "Z"});
-  lay_over(many, 0, 0, {1, 2, 4}, 0.25);
-  EXPECT_EQ(many.pixels, (std::vector<float>{0.25f, 0.5f, 1, 0}));
-}
-
 TEST(AnnotationsTest, RoundLengthsAreTheGreatestThatFit) {
   const std::vector<std::pair<double, double>> cases{{1, 1},     {1.99, 1},      {2, 2},      {4.9, 2},
                                                      {5, 5},     {9.99, 5},      {10, 10},    {0.013, 0.01},
@@ -78,22 +52,6 @@ TEST(AnnotationsTest, ScaleBarHasItsLength) {
       EXPECT_EQ(drawn_box(image, ground).min().x(), margin);
       EXPECT_EQ(drawn_box(image, ground).max().y(), height - margin - 1);
     }
-}
-
-/// A disk of ink with an outline: on any ground there is both, black and white.
-TEST(AnnotationsTest, InkIsSeenOnEveryGround) {
-  for (const float ground : {0.0f, 0.2f, 0.5f, 1.0f, 30.0f}) {
-    Image image = blank(200, 200, ground);
-    draw_axes(image, {1, 0, 0}, {0, 1, 0});
-    float least = std::numeric_limits<float>::infinity(), greatest = -least;
-    for (int y = 0; y < 100; ++y)
-      for (int x = 0; x < 100; ++x) {
-        least = std::min(least, image.pixel(x, y)[0]);
-        greatest = std::max(greatest, image.pixel(x, y)[0]);
-      }
-    EXPECT_LT(least, 0.01f) << ground;
-    EXPECT_GT(greatest, 0.99f) << ground;
-  }
 }
 
 /// A caption ends at the margin, on its base line, and changes nothing left of its width.

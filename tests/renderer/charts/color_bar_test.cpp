@@ -36,24 +36,6 @@ TEST(RoundTicksTest, LogarithmicScales) {
   EXPECT_THAT(labels({1e-9, 1e6, true}), ElementsAre("1e-9", "1e-6", "0.001", "1", "1000", "1e6"));
 }
 
-TEST(RoundTicksTest, AreFewRisingAndInTheRange) {
-  for (const bool logarithmic : {false, true})
-    for (int i = 0; i < 300; ++i) {
-      const double low = std::pow(10.0, i % 17 - 8) * (1 + 0.37 * (i % 11)), high = low * (1 + 0.01 * (i * i + 1));
-      for (const int most : {2, 3, 7}) {
-        const std::vector<Tick> ticks = round_ticks({low, high, logarithmic}, most);
-        ASSERT_LE(static_cast<int>(ticks.size()), most) << low << " " << high;
-        EXPECT_GE(ticks.size(), most == 7 ? 2u : 0u) << low << " " << high;
-        for (std::size_t k = 0; k < ticks.size(); ++k) {
-          EXPECT_GE(ticks[k].value, low * (1 - 1e-8));
-          EXPECT_LE(ticks[k].value, high * (1 + 1e-8));
-          EXPECT_NEAR(std::stod(ticks[k].label), ticks[k].value, 1e-9 * high);
-          EXPECT_GT(ticks[k].value, k > 0 ? ticks[k - 1].value : 0);
-        }
-      }
-    }
-}
-
 Image plain(int width, int height, float value) {
   Image image(width, height, {"R", "G", "B"});
   std::fill(image.pixels.begin(), image.pixels.end(), value);

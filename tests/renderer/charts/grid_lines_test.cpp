@@ -86,24 +86,6 @@ TEST(GridLinesTest, WidthDoesNotDependOnAngleOrMagnification) {
     }
 }
 
-TEST(GridLinesTest, DenseLinesFadeAway) {
-  const int size = 300;
-  double before = 1;
-  for (const double spacing : {6.0, 5.0, 4.0, 3.2}) {
-    const int cells = 10000;
-    const Coordinate s = [=](double x, double) { return 0.5 + (x - 150) / (spacing * cells); };
-    const Image image = drawn(size, 4, seen(size, 4, s, nothing), white_lines(cells, 1));
-    const double strength = white_pixels(image) / (4 * size / spacing);  // Of one line; 1 if it has not faded.
-    EXPECT_LT(strength, before + 0.02) << spacing;
-    before = strength;
-  }
-  EXPECT_LT(before, 0.1);
-  for (const double spacing : {3.0, 1.0, 0.01}) {
-    const Coordinate s = [=](double x, double) { return 0.5 + (x - 150) / (spacing * 10000); };
-    EXPECT_EQ(white_pixels(drawn(size, 4, seen(size, 4, s, nothing), white_lines(10000, 1))), 0) << spacing;
-  }
-}
-
 /// On a fold s is stationary: a line there may be up to twice as wide, and a line just beyond the fold adds nothing.
 TEST(GridLinesTest, FoldsAreNotFlooded) {
   const int width = 401, height = 5;

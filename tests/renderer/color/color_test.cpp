@@ -89,14 +89,6 @@ const std::string linear_role = "  scene_linear: linear\n";
 const std::string aces_role = "  aces_interchange: aces\n";
 const std::string xyz_role = "  cie_xyz_d65_interchange: xyz\n";
 
-TEST_F(ColorTest, BuiltInConfig) {
-  const ColorManagement color({});
-  EXPECT_EQ(color.config_name(), "built-in");
-  EXPECT_EQ(color.working_space(), "lin_rec709");
-  EXPECT_EQ(color.display(), "sRGB");
-  EXPECT_EQ(color.view(), "Un-tone-mapped");
-}
-
 TEST_F(ColorTest, APreferredViewCountsWhereTheDisplayHasItAndNoneIsNamed) {
   EXPECT_EQ(ColorManagement({"", "", "", soft_highlights_view}).view(), soft_highlights_view);
   EXPECT_EQ(ColorManagement({"", "", "Raw", soft_highlights_view}).view(), "Raw");
@@ -115,28 +107,6 @@ TEST_F(ColorTest, SoftHighlightsAreExponential) {
   color.to_display(pure);
   EXPECT_NEAR(pure.pixels[0], srgb(1 - std::exp(-0.5)), 1e-3);
   EXPECT_NEAR(pure.pixels[1], 0, 1e-3);
-}
-
-TEST_F(ColorTest, WhiteAndPrimariesOfRec709) {
-  const Eigen::Matrix3d matrix = ColorManagement({}).xyz_to_working();
-  EXPECT_TRUE((matrix * from_chromaticity(0.3127, 0.3290)).isApprox(Eigen::Vector3d::Ones(), 1e-5));
-  const double xy[3][2] = {{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}};
-  const double luminance[3] = {0.2126390, 0.7151687, 0.0721923};
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d rgb = matrix * (luminance[i] * from_chromaticity(xy[i][0], xy[i][1]));
-    EXPECT_LT((rgb - Eigen::Vector3d::Unit(i)).norm(), 1e-4) << rgb.transpose();
-  }
-}
-
-TEST_F(ColorTest, AdaptedWhitesAreNeutral) {
-  const ColorManagement color({});
-  for (const Spectrum& light :
-       {illuminant("A"), illuminant("D65"), illuminant("E"), blackbody(2000), blackbody(20000)}) {
-    const Eigen::Vector3d white = 3 * xyz_of(light);
-    EXPECT_TRUE((color.xyz_to_working_adapted(white) * white).isApprox(Eigen::Vector3d::Constant(3), 1e-5));
-  }
-  const Eigen::Vector3d d65 = from_chromaticity(0.3127, 0.3290);
-  EXPECT_TRUE(color.xyz_to_working_adapted(d65).isApprox(color.xyz_to_working(), 1e-12));
 }
 
 TEST_F(ColorTest, AdaptationIsBradfords) {

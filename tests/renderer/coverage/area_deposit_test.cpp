@@ -92,44 +92,6 @@ TEST(AreaDeposit, EachPixelGetsTheAreaThatItShares) {
     }
 }
 
-TEST(AreaDeposit, NeighboursMayShareTheirEdge) {
-  std::mt19937 engine(2);
-  for (int i = 0; i < 200; ++i) {
-    const Corners t = random_triangle(engine, 3);
-    const Vector2d d = random_triangle(engine, 3)[0];
-    AreaDeposit apart(width, height), joined(width, height);
-    add_triangle(apart, t[0], t[1], t[2], 0.3);
-    add_triangle(apart, t[0], t[2], d, 0.2);
-    const double first = joined.triangle(t[0], t[1], t[2], 0.3), second = joined.triangle(t[0], t[2], d, 0.2);
-    joined.add_edge(t[0], t[1], first);
-    joined.add_edge(t[1], t[2], first);
-    joined.add_edge(t[2], t[0], first - second);
-    joined.add_edge(t[2], d, second);
-    joined.add_edge(d, t[0], second);
-    const std::vector<double> a = pixels_of(apart), b = pixels_of(joined);
-    for (std::size_t k = 0; k < a.size(); ++k) ASSERT_NEAR(a[k], b[k], 1e-10) << i;
-  }
-}
-
-/// Four planes get their plane_weights of the same light.
-TEST(AreaDeposit, PlanesHaveShares) {
-  std::mt19937 engine(5);
-  AreaDeposit shared(width, height), single(width, height);
-  const AreaDeposit::PlaneWeights plane_weights{0.25, -1, 0, 0.7};
-  shared.set_plane_weights(plane_weights);
-  for (int i = 0; i < 300; ++i) {
-    const Corners t = random_triangle(engine, i % 7 == 0 ? 6 : 0.7);
-    add_triangle(shared, t[0], t[1], t[2], 1e-5);
-    add_triangle(single, t[0], t[1], t[2], 1e-5);
-  }
-  const std::vector<double> expected = pixels_of(single);
-  for (int plane = 0; plane < 4; ++plane) {
-    const std::vector<double> pixels = pixels_of(shared, plane);
-    for (std::size_t i = 0; i < pixels.size(); ++i)
-      ASSERT_NEAR(pixels[i], plane_weights[static_cast<std::size_t>(plane)] * expected[i], 1e-11) << plane;
-  }
-}
-
 /// Rows are the same, bit for bit, if a deposit keeps only some of them, and if several deposits share the triangles.
 TEST(AreaDeposit, PartsAddUpToTheWhole) {
   std::mt19937 engine(6);
@@ -153,26 +115,6 @@ TEST(AreaDeposit, PartsAddUpToTheWhole) {
   }
 }
 
-/// A triangle that is moved by whole pixels so that it does not leave the plate gives the same light.
-TEST(AreaDeposit, EdgesBeyondTheSidesAreCutOff) {
-  std::mt19937 engine(7);
-  for (int i = 0; i < 200; ++i) {
-    const Corners t = random_triangle(engine, 3);
-    AreaDeposit cut(width, height), wide(width + 40, height);
-    add_triangle(cut, t[0], t[1], t[2], 1e-5);
-    const Vector2d shift(20, 0);
-    add_triangle(wide, t[0] + shift, t[1] + shift, t[2] + shift, 1e-5);
-    const std::vector<double> pixels = pixels_of(cut);
-    wide.flush();
-    std::vector<double> row(width + 40);
-    for (int y = 0; y < height; ++y) {
-      AreaDeposit::read_row({&wide}, y, 0, row.data());
-      for (int x = 0; x < width; ++x)
-        ASSERT_NEAR(pixels[static_cast<std::size_t>(y * width + x)], row[static_cast<std::size_t>(x + 20)], 1e-13);
-    }
-  }
-}
-
 /// Rounding takes points of long edges over the borders of the plate.
 TEST(AreaDeposit, EdgesMayBeLong) {
   std::mt19937 engine(9);
@@ -185,21 +127,6 @@ TEST(AreaDeposit, EdgesMayBeLong) {
     EXPECT_NEAR(sum(pixels_of(deposit)) / 1e-5, part_on_plate(t[0], t[1], t[2], {width, height}), 1e-7)
         << i;  // Units of 2^-48.
   }
-}
-
-TEST(AreaDeposit, KnowsThePartOnThePlate) {
-  std::mt19937 engine(8);
-  int partly = 0;
-  for (int i = 0; i < 400; ++i) {
-    Corners t = random_triangle(engine, 5);
-    if (i % 10 == 0) t[2] = (t[0] + t[1]) / 2;  // Without area.
-    AreaDeposit deposit(width, height);
-    add_triangle(deposit, t[0], t[1], t[2], 1e-5);
-    const double part = part_on_plate(t[0], t[1], t[2], {width, height});
-    EXPECT_NEAR(sum(pixels_of(deposit)) / 1e-5, part, 1e-6) << i;
-    partly += part > 0.01 && part < 0.99 ? 1 : 0;
-  }
-  EXPECT_GT(partly, 50);
 }
 
 TEST(AreaDeposit, NoPowerIsLostWhereTrianglesHaveNoArea) {
@@ -230,21 +157,6 @@ TEST(AreaDeposit, LinesAreWhatThinTrianglesTendTo) {
   add_triangle(thin, a, b, c + Vector2d(0, 1e-3), 1e-3);
   const std::vector<double> expected = pixels_of(thin), pixels = pixels_of(line);
   for (std::size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(pixels[i], expected[i], 0.02e-3);
-}
-
-TEST(AreaDeposit, TheOrderDoesNotMatter) {
-  std::mt19937 engine(4);
-  std::vector<Corners> triangles;
-  for (int i = 0; i < 500; ++i) triangles.push_back(random_triangle(engine, 2));
-  std::vector<std::vector<double>> results;
-  for (int order = 0; order < 3; ++order) {
-    AreaDeposit deposit(width, height);
-    for (const Corners& t : triangles) add_triangle(deposit, t[0], t[1], t[2], 1e-3);
-    results.push_back(pixels_of(deposit));
-    std::shuffle(triangles.begin(), triangles.end(), engine);
-  }
-  EXPECT_EQ(results[0], results[1]);
-  EXPECT_EQ(results[0], results[2]);
 }
 
 }  // namespace

@@ -116,24 +116,6 @@ TEST(PlanarMesh, AgreesWithBruteForceWhereTrianglesOverlap) {
   EXPECT_GT(total, 2000u);
 }
 
-TEST(PlanarMesh, AFoldHasThreeLayers) {
-  // x = u³ − u/4 on [−1, 1] goes forwards, then back between its turning points u² = 1/12, then forwards again.
-  const double turning = 1 / (12 * std::sqrt(3));
-  const std::uint32_t cells = 64;
-  const PlanarMesh mesh = grid(cells, [](const Vector2d& p) {
-    const double u = 2 * p.x() - 1;
-    return Vector2d(u * u * u - u / 4, p.y());
-  });
-  const PlanarMeshSearch search(mesh);
-  std::mt19937 random(2);
-  for (int i = 0; i < 2000; ++i) {
-    const Vector2d point(uniform(random, -0.15, 0.15), uniform(random, 0, 1));
-    const double depth = turning - std::abs(point.x());
-    if (std::abs(depth) < 2e-3) continue;  // The mesh has chords there and turns up to 2e-4 earlier.
-    EXPECT_EQ(found(search, point).size(), depth > 0 ? 3u : 1u) << point.transpose();
-  }
-}
-
 struct Place {
   Vector2d offset;
   double scale;

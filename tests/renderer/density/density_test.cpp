@@ -86,15 +86,6 @@ TEST(Density, AgreesWithTheDirectSum) {
         EXPECT_LT(error_of(40, 40, tau, {{20 + x, 20 + y}}), tau < 4 ? 1e-3 : 1.1e-4) << tau << " " << x << " " << y;
 }
 
-TEST(Density, ConservesEveryPoint) {
-  const Points points = random_points(1000, 40, 30);
-  for (const double tau : {0.3, 1.0, 1.5, 6.0, 25.0})
-    for (const DensityKind kind : {DensityKind::gaussian, DensityKind::histogram})
-      EXPECT_NEAR(sum_of(estimate(40, 30, {kind, tau}, points)), 1000, 1e-5) << tau;
-  for (const double tau : {1.0, 6.0, 100.0})  // Of a plate that is smaller than the kernel.
-    EXPECT_NEAR(sum_of(estimate(2, 1, {DensityKind::gaussian, tau}, {{0.3, 0.4}, {1.9, 0.9}})), 2, 1e-8) << tau;
-}
-
 TEST(Density, UniformLightIsUniformUpToTheEdges) {
   // Lattices of points that do not match the pixels. The coarsest ones have fewer points than pixels.
   for (const double spacing : {0.37, 0.95, 1.0, 1.05, 2.1, 4.0}) {
@@ -151,16 +142,6 @@ TEST(Density, MomentsOfFootprintsAreThoseOfTheEllipse) {
   }
 }
 
-TEST(Density, ALatticeOfFootprintsIsEvenUpToTheEdges) {
-  constexpr int size = 64;
-  constexpr double spacing = 2;
-  DensityEstimator deposit(size, size, 1, footprints);
-  for (double y = spacing / 2; y < size; y += spacing)
-    for (double x = spacing / 2; x < size; x += spacing) deposit.add(0, {x, y}, 0.7 * spacing * Matrix2d::Identity());
-  // The first harmonic of the lattice, less that of the cut-off.
-  for (const double value : deposit.finish(spacing * spacing).values) EXPECT_NEAR(value, 1, 0.01);
-}
-
 /// Each kind of kernel.
 const std::vector<DensitySettings> all_kinds{
     {DensityKind::histogram}, {DensityKind::gaussian, 0.8}, {DensityKind::gaussian, 3}, footprints};
@@ -187,45 +168,6 @@ void add_sums(const std::string& sums, DensityEstimator& estimator) {
   Archive archive(sums);
   estimator.copy_sums(archive);
   archive.finish();
-}
-
-TEST(Density, ColoursAreThoseOfTheChannelsPlanes) {
-  for (const DensitySettings& settings : all_kinds) {
-    DensityEstimator colored(width, height, 3, settings, rgb), plain(width, height, 3, settings);
-    add_photons(colored);
-    add_photons(plain);
-    const Film picture = colored.finish(0.5), planes = plain.finish(0.5);
-    ASSERT_EQ(picture.channels, 3);
-    for (std::size_t i = 0; i < picture.plane_size(); ++i)
-      for (int c = 0; c < 3; ++c) {
-        double expected = 0;
-        for (int k = 0; k < 3; ++k) expected += planes.plane(k)[i] * rgb[k][c];
-        ASSERT_NEAR(picture.plane(c)[i], expected, 1e-7);
-      }
-  }
-}
-
-TEST(Density, SumsDependNeitherOnThreadsNorOnParts) {
-  constexpr int parts = 5;
-  for (const DensitySettings& settings : all_kinds)
-    for (const std::vector<Eigen::Vector3d>& colors : {rgb, std::vector<Eigen::Vector3d>()}) {
-      const auto empty = [&] { return DensityEstimator(width, height, 3, settings, colors); };
-      DensityEstimator all = empty(), joined = empty();
-      add_photons(all);
-      {
-        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
-        DensityEstimator alone = empty();
-        add_photons(alone);
-        EXPECT_EQ(sums_of(all), sums_of(alone));
-        EXPECT_EQ(all.finish().values, alone.finish().values);
-      }
-      for (int part = parts; part-- > 0;) {
-        DensityEstimator some = empty();
-        add_photons(some, part, parts);
-        add_sums(sums_of(some), joined);
-      }
-      EXPECT_EQ(sums_of(all), sums_of(joined));
-    }
 }
 
 TEST(Density, RefusesSumsOfAnotherEstimator) {

@@ -108,15 +108,6 @@ TEST(PhotonTracerTest, TheSunsPowerIsThatOfTheSilhouette) {
   EXPECT_NEAR(power_in(photons, 1), 0.5 * 3 * silhouette, 1e-6);
 }
 
-/// The power of a point within the solid angle of the cube: that of a face seen from a place above its middle.
-TEST(PhotonTracerTest, APointsPowerIsThatOfItsSolidAngle) {
-  const PointLight point{{0, 0, 2}, {5, 7}};
-  const PhotonMaps photons = traced(ClearCube(), floor_at(-0.8, 40), {point}, settings_of(40000));
-  const double solid_angle = 4 * std::asin(1 / (1 + 4 * 1.5 * 1.5));
-  EXPECT_NEAR(power_in(photons, 0), 5 * solid_angle, 1e-3 * 5 * solid_angle);
-  EXPECT_NEAR(power_in(photons, 1), 7 * solid_angle, 1e-3 * 7 * solid_angle);
-}
-
 TEST(PhotonTracerTest, OfRanksAreThoseOfOneProcess) {
   const SurfaceScene floor = floor_at(-0.8, 3);
   const std::vector<Light> lights{sun({0.4, 0.3, -1}), PointLight{{0, 0, 2}, {5, 7}}};
@@ -274,22 +265,6 @@ TEST(PhotonTracerTest, TheSameBytesOnAnyNumberOfThreads) {
       ASSERT_EQ(photons.size(), first.size());
       EXPECT_EQ(std::memcmp(photons.data(), first.data(), photons.size() * sizeof(Photon)), 0);
     }
-}
-
-/// The mean over the passes at a point in the shadow, near its edge, falls as the radius shrinks.
-TEST(PhotonTracerTest, TheBiasFallsWithTheRadius) {
-  EXPECT_NEAR(std::pow(photon_radius(2, 1) / photon_radius(2, 0), 2), (1 + 2.0 / 3) / 2, 1e-12);
-  EXPECT_NEAR(std::pow(photon_radius(2, 9) / photon_radius(2, 8), 2), (9 + 2.0 / 3) / 10, 1e-12);
-  const SurfaceScene floor = floor_at(-0.8, 40);
-  const SurfaceHit shadow = *floor.intersect({0.57, 0, 0}, {0, 0, -1});
-  std::vector<double> means;
-  for (const int passes : {1, 8, 64}) {
-    const PhotonMaps photons = traced(ClearCube(), floor, {sun({0, 0, -1})}, settings_of(20000, passes, 0.15));
-    means.push_back(irradiance(photons, shadow, 0).mean());
-  }
-  EXPECT_GT(means[0], 0.1);
-  EXPECT_LT(means[1], 0.7 * means[0]);
-  EXPECT_LT(means[2], 0.5 * means[1]);
 }
 
 /// The lattice finds what a search through all photons finds.

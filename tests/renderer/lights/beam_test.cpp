@@ -65,19 +65,6 @@ TEST(Beam, GridPositionsAreCellCentres) {
   EXPECT_EQ(emission.across, Eigen::Vector2d(0.375, 0.375));
 }
 
-TEST(Beam, SeedsChangeRandomPatternsAndNothingElseDoes) {
-  const Beam beam = silhouette_beam(cube_corners(), {0, 0, -1}, Vector3d::UnitY());
-  for (const BeamPattern pattern : {BeamPattern::stratified, BeamPattern::sobol, BeamPattern::random}) {
-    const BeamSampler a(beam, pattern, 100, 1), again(beam, pattern, 100, 1), b(beam, pattern, 100, 2);
-    Emission first, second, other;
-    a.sample(17, first);
-    again.sample(17, second);
-    b.sample(17, other);
-    EXPECT_EQ(first.origin, second.origin);
-    EXPECT_NE(first.origin, other.origin);
-  }
-}
-
 TEST(Beam, StrataSpreadOverThePositions) {
   // In each part of the beam, an eighth of the positions of a lattice has its stratum in each of 8 ranges.
   const Beam beam = silhouette_beam(cube_corners(), {0, 0, -1}, Vector3d::UnitY());

@@ -75,23 +75,6 @@ TEST(AreaLight, ShinesFromItsFrontOnlyUnlessBothSidesDo) {
   EXPECT_EQ(*one.emitted(0, normal, -down), std::vector<float>{3});
 }
 
-TEST(AreaLight, DensityIntegratesToOne) {
-  const LightSampler lights({lamp(1), lamp(3)}, {1}, unit_scene);
-  const Vector3d point(0, 0, 0.3), center(0.3, -0.2, 1.5), right(0.8, 0, -0.6), up(0, -1, 0);
-  const Vector3d normal = right.cross(up);
-  constexpr int rows = 1000;
-  double sum = 0;
-  for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < 2 * rows; ++x) {
-      const Vector3d d = square_to_sphere({(y + 0.5) / rows, (x + 0.5) / (2 * rows)});
-      const double distance = (center - point).dot(normal) / d.dot(normal);
-      const Vector3d position = point + distance * d, p = position - center;
-      if (distance > 0 && std::abs(p.dot(right)) < 1 && std::abs(p.dot(up)) < 0.6)
-        sum += lights.area_pdf(1, point, position, normal);
-    }
-  EXPECT_NEAR(sum * 2 * pi / rows / rows, 0.75, 0.75 * 5e-3);  // Cells at the border count either fully or not at all.
-}
-
 /// Adds a rectangle of 10 × 10 × 2 triangles, lit below, about (0, 0, height).
 void add_fine_rectangle(double height, TriangleMesh& mesh) {
   for (int y = 0; y < 10; ++y)
@@ -125,21 +108,6 @@ TEST(AreaLight, DensityOfADirectionDoesNotDependOnTheNumberOfTriangles) {
   EXPECT_GT(one, 100);
 }
 
-TEST(DirectionalLight, ParallelLightIsADelta) {
-  const LightSampler lights({DirectionalLight{{0, 3, -4}, {5, 7}, 0}}, {1, 1}, unit_scene);
-  LightSample sample;
-  ASSERT_TRUE(lights.sample({1, 2, 3}, {0.1, 0.2}, sample));
-  EXPECT_TRUE(sample.is_delta);
-  EXPECT_EQ(sample.pdf, 1);
-  EXPECT_LT((sample.direction - Vector3d(0, -0.6, 0.8)).norm(), 1e-15);
-  EXPECT_EQ(sample.radiance, (std::vector<float>{5, 7}));
-  EXPECT_TRUE(std::isinf(sample.distance));
-  EXPECT_EQ(lights.background_pdf(sample.direction), 0);
-  std::vector<float> radiance;
-  lights.background(sample.direction, radiance);
-  EXPECT_EQ(radiance, (std::vector<float>{0, 0}));
-}
-
 TEST(DirectionalLight, ADiskGivesItsIrradiance) {
   const Vector3d to_light(0, -0.6, 0.8);
   for (const double angle : {1e-6, 0.00465, 0.3, pi / 2}) {
@@ -155,21 +123,6 @@ TEST(DirectionalLight, ADiskGivesItsIrradiance) {
     EXPECT_FALSE(sample.is_delta);
     EXPECT_NEAR(sample.pdf * cone_solid_angle(angle), 1, 1e-12);
     EXPECT_EQ(lights.background_pdf(to_light), 1 / cone_solid_angle(angle));
-  }
-}
-
-TEST(ConstantLight, IsLeftToTheMaterial) {
-  for (const bool has_other : {false, true}) {
-    std::vector<Light> list{ConstantLight{{2, 0.5f}}};
-    if (has_other) list.emplace_back(DirectionalLight{{0, 0, -1}, {1, 1}, 0.1});
-    const LightSampler lights(list, {1, 1}, unit_scene);
-    LightSample sample;
-    EXPECT_EQ(lights.sample(Vector3d::Zero(), {0.5, 0.5}, sample), has_other);
-    EXPECT_EQ(lights.choice_probability(0), 0);
-    EXPECT_EQ(lights.background_pdf({0.6, 0, 0.8}), 0);
-    std::vector<float> radiance;
-    lights.background({0.6, 0, 0.8}, radiance);
-    EXPECT_EQ(radiance, (std::vector<float>{2, 0.5f}));
   }
 }
 
@@ -215,18 +168,6 @@ TEST(LightSampler, SampledBackgroundIsWhatARayWouldSee) {
     EXPECT_EQ(lights.background_pdf(sample.direction), sample.pdf);
     EXPECT_TRUE(std::isinf(sample.distance));
   }
-}
-
-TEST(LightSampler, ChoosesByPower) {
-  // The bounding sphere of the scene has the radius √3 and the cross section 3 π.
-  const double lamp_power = pi * 2.4 * 3, parallel_power = 3 * pi * 2, point_power = 4 * pi * 0.1;
-  const LightSampler lights({lamp(3), DirectionalLight{{0, 0, -1}, {2}, 0}, PointLight{{0, 0, 3}, {0.1f}}, lamp(0)},
-                            {1}, unit_scene);
-  const double sum = lamp_power + parallel_power + point_power;
-  EXPECT_NEAR(lights.choice_probability(0), lamp_power / sum, 1e-7);
-  EXPECT_NEAR(lights.choice_probability(1), parallel_power / sum, 1e-7);
-  EXPECT_NEAR(lights.choice_probability(2), point_power / sum, 1e-7);
-  EXPECT_EQ(lights.choice_probability(3), 0);
 }
 
 TEST(LightSampler, NoLightIsDark) {

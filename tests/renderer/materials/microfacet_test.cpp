@@ -30,25 +30,6 @@ double hemisphere(const Function& function) {
   return sum * 2 * pi / rows / columns;
 }
 
-TEST(MicrofacetTest, VisibleFacetsAreADistribution) {
-  for (const double alpha : {0.1, 0.4, 1.0})
-    for (const double cosine : {1.0, 0.6, 0.1}) {
-      const Eigen::Vector3d wo = direction_at(cosine, 0.3);
-      EXPECT_NEAR(hemisphere([&](const Eigen::Vector3d& m) { return ggx_visible_pdf(alpha, wo, m); }), 1, 1e-3)
-          << alpha << " " << cosine;
-    }
-}
-
-TEST(MicrofacetTest, ReflectionIsItsDensityTimesShadowing) {
-  for (const double alpha : {0.0004, 0.3, 1.0})
-    for (const double cosine : {1.0, 0.5, 1e-4}) {
-      const Eigen::Vector3d wo = direction_at(cosine, 0), wi = direction_at(0.4, 2);
-      const GgxReflection there = ggx_reflection(alpha, wi, wo);
-      EXPECT_NEAR(there.f * wi.z() / (there.pdf * ggx_shadowing(alpha, wo.z(), wi.z())), 1, 1e-12);
-      EXPECT_NEAR(there.f / ggx_reflection(alpha, wo, wi).f, 1, 1e-12);
-    }
-}
-
 TEST(MicrofacetTest, DielectricFresnelHasItsClosedForms) {
   EXPECT_NEAR(fresnel_dielectric(1, 1.5), 0.04, 1e-15);
   EXPECT_NEAR(fresnel_dielectric(1, 1 / 1.5), 0.04, 1e-15);
@@ -73,28 +54,6 @@ TEST(MicrofacetTest, ConductorFresnelIsThatOfComplexNumbers) {
           << index << " " << cosine;
     }
   for (const double cosine : {0.0, 1e-9, 0.5, 1.0}) EXPECT_EQ(fresnel_conductor(cosine, 0, 1), 1);
-}
-
-TEST(MicrofacetTest, MeansUnderUniformLight) {
-  EXPECT_NEAR(hemispherical_mean([](double) { return 1.0; }), 1, 1e-12);
-  EXPECT_NEAR(hemispherical_mean([](double cosine) { return fresnel_schlick(cosine, 0.3); }), 0.3 + 0.7 / 21, 1e-4);
-  EXPECT_NEAR(visible_mean(0.5, 0.3, [](const auto&, const auto&) { return 0.25; }), 0.25, 1e-12);
-  // With alpha 1 the facets have the normals of a hemisphere; from above they are visible by their cosine: ∫ cos² / π.
-  EXPECT_NEAR(visible_mean(1, 1, [](const auto&, const Eigen::Vector3d& m) { return m.z(); }), 2.0 / 3, 1e-3);
-}
-
-TEST(CosineTableTest, FollowsItsFunction) {
-  const auto function = [](double cosine) { return 0.2 + 0.5 * cosine * cosine; };
-  for (const double alpha : {0.0004, 0.1, 1.0}) {
-    const CosineTable table = make_cosine_table(alpha, function);
-    for (int i = 0; i <= 1000; ++i) EXPECT_NEAR(table.at(i / 1000.0), function(i / 1000.0), 1e-4);
-    EXPECT_NEAR(table.mean(), 0.45, 1e-4);
-    EXPECT_NEAR(hemisphere([&](const Eigen::Vector3d& w) { return table.pdf(w.z()); }), 1, 1e-3);
-    double sum = 0;
-    for (int i = 0; i < 4096; ++i) sum += std::pow(table.sample({sobol(1, i, 0), sobol(1, i, 1)}).z(), 2) / 4096;
-    EXPECT_NEAR(sum, (0.1 + 0.5 / 3) / 0.45, 1e-3);
-  }
-  EXPECT_EQ(make_cosine_table(1, [](double) { return 0.0; }).pdf(0.5), 0);
 }
 
 TEST(MetalTest, HasThePublishedValuesAndTheirMeans) {

@@ -37,18 +37,6 @@ TriangleMesh unit_box() { return box_mesh({Vector3d::Zero(), Vector3d::Ones()}, 
 const std::string tetrahedron_ply =
     ply_header("ascii", 4, 4) + "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
 
-TEST(BoxMeshTest, LooksOutwards) {
-  const AlignedBox3d box(Vector3d(-1, 2, 0.5), Vector3d(1, 3, 4));
-  TriangleMesh mesh = box_mesh(box, Eigen::Affine3d::Identity());
-  EXPECT_EQ(mesh.vertices.size(), 8u);
-  EXPECT_EQ(mesh.triangles.size(), 12u);
-  EXPECT_DOUBLE_EQ(volume(mesh), box.volume());
-  EXPECT_DOUBLE_EQ(surface_area(mesh), 2 * (2 * 1 + 1 * 3.5 + 2 * 3.5));
-  EXPECT_EQ(mesh.bounds().min(), box.min());
-  EXPECT_EQ(mesh.bounds().max(), box.max());
-  EXPECT_NO_THROW(require_closed(mesh));
-}
-
 TEST(BoxMeshTest, FollowsTheTransform) {
   Eigen::Affine3d transform = Eigen::Translation3d(5, 6, 7) * Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()) *
                               Eigen::Scaling(2.0, 3.0, 0.5);
@@ -159,23 +147,6 @@ TEST(ReadMeshTest, PlyKeepsDoublePrecisionAndDividesPolygons) {
   EXPECT_EQ(mesh.vertices[0], Vector3d(0, 0, 0.1));
   EXPECT_EQ(mesh.triangles.size(), 2u);
   EXPECT_DOUBLE_EQ(surface_area(mesh), 1);
-}
-
-TEST(ReadMeshTest, ObjWithPolygonsAndSeveralObjects) {
-  // A unit cube of quadrilaterals, and a separate tetrahedron as second object. Both have normals, which differ at the
-  // corners that faces share.
-  const Temporary file("objects.obj",
-                       "o cube\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
-                       "vn 0 0 -1\nvn 0 0 1\nvn 0 -1 0\nvn 0 1 0\nvn -1 0 0\nvn 1 0 0\n"
-                       "f 1//1 4//1 3//1 2//1\nf 5//2 6//2 7//2 8//2\nf 1//3 2//3 6//3 5//3\n"
-                       "f 4//4 8//4 7//4 3//4\nf 1//5 5//5 8//5 4//5\nf 2//6 3//6 7//6 6//6\n"
-                       "o tetrahedron\nv 5 0 0\nv 6 0 0\nv 5 1 0\nv 5 0 1\n"
-                       "f 9 11 10\nf 9 10 12\nf 9 12 11\nf 10 11 12\n");
-  TriangleMesh mesh = read_mesh(file.path());
-  EXPECT_EQ(mesh.vertices.size(), 12u);
-  EXPECT_EQ(mesh.triangles.size(), 16u);
-  EXPECT_NO_THROW(require_closed(mesh));
-  EXPECT_NEAR(volume(mesh), 1 + 1 / 6.0, 1e-6);
 }
 
 TEST(ReadMeshTest, JoinsEqualPositionsAndDropsDegenerateTriangles) {
@@ -391,15 +362,6 @@ TEST(ReadMeshTest, FormatsWithUnitAndAxesAreInMetresWithZUp) {
       EXPECT_LT(nearest, 1e-6) << each.name << " " << expected.transpose();
     }
     EXPECT_GE(volume(mesh), 0) << each.name;  // Not mirrored.
-  }
-}
-
-TEST(ReadMeshTest, OtherFormatsAreRefusedWithTheList) {
-  for (const std::string name : {"a.3ds", "a.3mf", "a.x3d", "a.blend", "a"}) {
-    const Temporary file(name, "solid\n");
-    EXPECT_THAT(message([&] { read_mesh(file.path()); }),
-                HasSubstr("a mesh is a .ply, .obj, .stl, .off, .gltf, .glb, .dae, .fbx file; convert"))
-        << name;
   }
 }
 

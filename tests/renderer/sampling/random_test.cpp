@@ -19,30 +19,6 @@ double pair_score(const First& first, const Second& second) {
   return square_score([&](int i) { return Eigen::Vector2d(first(i), second(i)); });
 }
 
-TEST(RandomUniformTest, IsAFunctionOfItsKeys) {
-  EXPECT_EQ(random_uniform(1, 2, 3), random_uniform(1, 2, 3));
-  std::set<double> values;
-  for (int seed = 0; seed < 20; ++seed)
-    for (int index = 0; index < 20; ++index)
-      for (int dimension = 0; dimension < 20; ++dimension) values.insert(random_uniform(seed, index, dimension));
-  EXPECT_EQ(values.size(), 8000u);
-}
-
-TEST(RandomUniformTest, IsUniform) {
-  std::vector<int> counts(1000);
-  double low_bits = 0;
-  for (int i = 0; i < 1000000; ++i) {
-    const double value = random_uniform(7, i, 0);
-    ASSERT_GE(value, 0);
-    ASSERT_LT(value, 1);
-    ++counts[static_cast<int>(value * 1000)];
-    const double fine = value * 0x1p40;
-    low_bits += fine - std::floor(fine);
-  }
-  EXPECT_LT(std::abs(chi_square_score(counts)), 4);
-  EXPECT_NEAR(low_bits / 1e6, 0.5, 4 / std::sqrt(12e6));
-}
-
 TEST(RandomUniformTest, KeysAreIndependent) {
   const auto base = [](int i) { return random_uniform(5, i, 0); };
   EXPECT_LT(std::abs(pair_score(base, [](int i) { return random_uniform(5, i, 1); })), 4) << "dimensions";
@@ -76,22 +52,6 @@ TEST(SobolTest, FirstPointsFillEveryElementaryInterval) {
         for (const int count : counts)
           ASSERT_EQ(count, 1) << "seed " << seed << ", 2^" << k << " points, column bits " << i;
       }
-}
-
-TEST(SobolTest, ThreeDimensionsAreStratifiedTogether) {
-  constexpr int k = 9;
-  for (int i = 0; i < k; ++i)
-    for (int j = 0; i + j < k; ++j) {
-      const int l = k - 1 - i - j;
-      std::vector<int> counts(1 << (k - 1));
-      for (int index = 0; index < (1 << k); ++index) {
-        const int x = static_cast<int>(std::ldexp(sobol(3, index, 0), i));
-        const int y = static_cast<int>(std::ldexp(sobol(3, index, 1), j));
-        const int z = static_cast<int>(std::ldexp(sobol(3, index, 2), l));
-        ++counts[(((x << j) + y) << l) + z];
-      }
-      for (const int count : counts) ASSERT_EQ(count, 2) << i << " " << j << " " << l;
-    }
 }
 
 /// The coordinates of a joint point, with one of its twins.
@@ -143,15 +103,6 @@ TEST(SobolTest, TwinsAreUncorrelated) {
     second2 += second * second;
   }
   EXPECT_LT(std::abs(product) / std::sqrt(first2 * second2), 4 / std::sqrt(4000.0));
-}
-
-TEST(SobolTest, SeedsAreIndependent) {
-  // One point of many seeds must be uniform, and two of them independent except for the stratification of the pair:
-  // points 0 and 1 lie in different halves, so the second is first mapped from its half to the whole interval.
-  const auto first = [](int seed) { return sobol(seed, 0, 0); };
-  EXPECT_LT(std::abs(pair_score(first, [](int seed) { return sobol(seed, 0, 1); })), 4);
-  EXPECT_LT(std::abs(pair_score(first, [](int seed) { return std::fmod(2 * sobol(seed, 1, 0), 1.0); })), 4);
-  EXPECT_LT(std::abs(pair_score(first, [](int seed) { return sobol(seed + 1, 0, 0); })), 4);
 }
 
 }  // namespace

@@ -136,22 +136,6 @@ TEST(ReflectanceTest, SpectraOfTheModelAreFoundAgain) {
   }
 }
 
-TEST(ReflectanceTest, SpectraAreSmooth) {
-  // No feature is narrower than 20 nm.
-  constexpr double steepest_bend = 1.0 / (20 * 20);
-  for (const NamedLight& light : lights())
-    for (const int count : {16, 70}) {
-      const Scene scene = make_scene(light.spectrum, count);
-      for (const Vector3d& rgb : cube(6, 0.05, 0.95)) {
-        const ReflectanceSpectrum spectrum = scene.model.spectrum(rgb);
-        for (double wavelength = 381; wavelength < 730; ++wavelength)
-          ASSERT_LT(std::abs(spectrum.at(wavelength - 1) - 2 * spectrum.at(wavelength) + spectrum.at(wavelength + 1)),
-                    steepest_bend)
-              << light.name << count << ": " << rgb.transpose() << " at " << wavelength;
-      }
-    }
-}
-
 TEST(ReflectanceTest, IsWithinZeroAndOneAndDeterministic) {
   for (const Matrix3d& space : {Matrix3d(Matrix3d::Identity()), rec709_to_acescg()})
     for (const int count : {1, 2, 3, 4, 5, 16}) {

@@ -127,16 +127,6 @@ TEST(BandsTest, EqualsAFineSum) {
   }
 }
 
-TEST(BandsTest, BandsLieSideBySide) {
-  const std::vector<Band> bands = make_bands(illuminant("E"), 400, 700, 3);
-  ASSERT_EQ(bands.size(), 3u);
-  for (int i = 0; i < 3; ++i) {
-    EXPECT_DOUBLE_EQ(bands[i].wavelength, 450 + 100 * i);
-    EXPECT_DOUBLE_EQ(bands[i].width, 100);
-    EXPECT_NEAR(bands[i].power, 1 / 3.0, 1e-12);
-  }
-}
-
 TEST(BandsTest, MonochromaticLight) {
   const std::vector<Band> bands = make_bands(Spectrum{{550}, {5}}, 550, 550, 1);
   ASSERT_EQ(bands.size(), 1u);

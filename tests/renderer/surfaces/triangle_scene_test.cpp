@@ -124,27 +124,6 @@ TEST(TriangleScene, NearReportsLongTrianglesOnce) {
   EXPECT_GT(found, 0u);
 }
 
-TEST(TriangleScene, MeetsTrianglesOnlyBetweenTheDistances) {
-  const TriangleMesh box = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, Eigen::Affine3d::Identity());
-  const TriangleScene scene({&box}, Vector3d::Zero(), 2);
-  const Vector3d from(0.3, 0.2, 0), up(0, 0, 1);
-  EXPECT_NEAR(scene.nearest(from, up, 0, infinite)->distance, 1, 1e-6);
-  EXPECT_NEAR(scene.nearest(from, up, -2, infinite)->distance, -1, 1e-6);
-  EXPECT_FALSE(scene.nearest(from, up, -0.9, 0.9));
-  EXPECT_FALSE(scene.nearest(from, up, 1.1, infinite));
-}
-
-TEST(TriangleScene, WorksFarFromTheOriginAndInAnyUnit) {
-  for (const double unit : {1e-20, 1.0, 1e20}) {
-    const Eigen::Affine3d transform = Eigen::Scaling(unit) * Eigen::Translation3d(1e6, -1e6, 1e6);
-    const TriangleMesh box = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, transform);
-    const TriangleScene scene({&box}, box.bounds().center(), box.bounds().diagonal().norm());
-    const auto hit = scene.nearest(transform * Vector3d(0.3, 0.2, 0), Vector3d(0, 0, 1), 0, infinite);
-    ASSERT_TRUE(hit) << unit;
-    EXPECT_NEAR(hit->distance / unit, 1, 1e-6);
-  }
-}
-
 /// Embree aborts the process on some rays; TriangleScene must not pass them on.
 TEST(TriangleScene, RaysMayStartAnywhere) {
   const TriangleMesh box = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, Eigen::Affine3d::Identity());
@@ -200,54 +179,6 @@ TEST(TriangleScene, NearMissesNoBoxAndLeavesOutWhatIsFar) {
   }
   EXPECT_GT(close, 1000u);
   EXPECT_LT(proposed, 500 * 700u / 4);
-}
-
-TEST(TriangleScene, PlanarVerticesLieAtZero) {
-  const std::vector<Eigen::Vector2d> vertices = {{5, 5}, {7, 5}, {5, 7}};
-  const TriangleScene scene(vertices, {{0, 1, 2}}, Eigen::Vector2d(6, 6), 2);
-  const auto hit = scene.nearest({5.5, 5.5, 4}, {0, 0, -1}, 0, infinite);
-  ASSERT_TRUE(hit);
-  EXPECT_NEAR(hit->distance, 4, 1e-5);
-  EXPECT_FALSE(scene.nearest({6.5, 6.5, 4}, {0, 0, -1}, 0, infinite));
-}
-
-TEST(TriangleScene, NothingIsFoundWhereThereAreNoTriangles) {
-  const TriangleMesh none;
-  for (const auto& meshes : {std::vector<const TriangleMesh*>{}, std::vector<const TriangleMesh*>{&none, &none}}) {
-    const TriangleScene scene(meshes, Vector3d::Zero(), 1);
-    EXPECT_TRUE(scene.empty());
-    EXPECT_FALSE(scene.nearest(Vector3d::Zero(), Vector3d::UnitX(), -1, infinite));
-    std::vector<TriangleId> candidates(1);
-    scene.near(Vector3d::Zero(), 1, candidates);
-    EXPECT_TRUE(candidates.empty());
-  }
-}
-
-TEST(TriangleScene, ThreadsMaySearchAtOnce) {
-  Soup soup(4);
-  TriangleScene built = soup.scene();
-  const TriangleScene scene = std::move(built);
-  std::vector<std::pair<Vector3d, Vector3d>> rays;
-  for (int i = 0; i < 2000; ++i) rays.emplace_back(soup.random.point(1), soup.random.point(1).normalized());
-  std::vector<std::optional<TriangleHit>> together(rays.size());
-  std::vector<std::vector<TriangleId>> near(rays.size());
-  tbb::parallel_for(std::size_t{0}, rays.size(), [&](std::size_t i) {
-    together[i] = scene.nearest(rays[i].first, rays[i].second, -1, infinite);
-    scene.near(rays[i].first, 0.1, near[i]);
-  });
-  std::size_t hits = 0, candidates = 0;
-  std::vector<TriangleId> alone;
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const auto hit = scene.nearest(rays[i].first, rays[i].second, -1, infinite);
-    ASSERT_EQ(hit.has_value(), together[i].has_value());
-    ASSERT_TRUE(!hit || same(*hit, *together[i]));
-    scene.near(rays[i].first, 0.1, alone);
-    ASSERT_TRUE(std::equal(alone.begin(), alone.end(), near[i].begin(), near[i].end(), same<TriangleId, TriangleId>));
-    hits += hit ? 1 : 0;
-    candidates += alone.size();
-  }
-  EXPECT_GT(hits, 500u);
-  EXPECT_GT(candidates, 500u);
 }
 
 }  // namespace

@@ -127,19 +127,6 @@ TEST(EnvironmentMap, SamplesFollowTheDensity) {
   EXPECT_LT(std::abs(chi_square_score(counts, weights)), 4);
 }
 
-TEST(EnvironmentMap, LightIsNeverMissed) {
-  const EnvironmentMap map(uneven_sky(), {1});
-  int dark = 0;
-  for (int i = 0; i < 20000; ++i) {
-    const Vector3d d = square_to_sphere({random_uniform(5, i, 0), random_uniform(5, i, 1)});
-    if (radiance(map, d) > 0) {
-      EXPECT_GT(map.pdf(d), 0);
-    }
-    dark += map.pdf(d) == 0;
-  }
-  EXPECT_GT(dark, 0);
-}
-
 TEST(EnvironmentMap, ImportanceOfAnEvenSkyIsExact) {
   EnvironmentLight light = grey(7, 4);
   for (float& value : light.picture.pixels) value = 3;

@@ -113,29 +113,5 @@ TEST_F(PointLoadPicture, WithThePushThereIsADarkDiscWithARedRim) {
   }
 }
 
-TEST_F(PointLoadPicture, AgainstThePushTheCentreIsBrightAndBluish) {
-  const Image image = picture("point_load_photons_against.json");
-  const Eigen::Vector3d centre = ring(image, 0, 0.3);
-  EXPECT_GT(centre.minCoeff(), 1.1);
-  EXPECT_GT(centre.z(), 1.05 * centre.x());
-}
-
-TEST_F(PointLoadPicture, FromTheSideBlueLightGathersAtTheLoad) {
-  const Image image = picture("point_load_photons_side.json");
-  Eigen::Vector3d brightest = Eigen::Vector3d::Zero();
-  int row = 0;
-  for (int y = 0; y < image.height; ++y) {
-    const Eigen::Vector3d colour = Eigen::Vector3f(image.pixel(65, y)).cast<double>();
-    if (colour.sum() > brightest.sum()) {
-      brightest = colour;
-      row = y;
-    }
-  }
-  EXPECT_LT(row, 45);  // The brightest pixel is in the upper third, because the load is at the top.
-  EXPECT_GT(brightest.z(), 1.5);
-  const Eigen::Vector3d far = Eigen::Vector3f(image.pixel(30, 95)).cast<double>();
-  EXPECT_LT((far.array() / far.mean() - 1).abs().maxCoeff(), 0.1);  // Grey.
-}
-
 }  // namespace
 }  // namespace tensorray

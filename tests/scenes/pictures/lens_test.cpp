@@ -33,22 +33,6 @@ std::string small_lens(const std::string& rest, const std::string& kind = R"("ki
 constexpr const char* no_bending =
     R"("kind": "constant", "resolution": 9, "tensor": [[0, 0, 0], [0, 0, 0], [0, 0, 0]])";
 
-const std::vector<std::string> lens_channels{"R",
-                                             "G",
-                                             "B",
-                                             "A",
-                                             "texture.s",
-                                             "texture.t",
-                                             "displacement.x",
-                                             "displacement.y",
-                                             "displacement.z",
-                                             "magnification.log",
-                                             "magnification.major",
-                                             "magnification.minor",
-                                             "folds",
-                                             "length",
-                                             "end"};
-
 using Lens = Pictures;
 
 TEST_F(Lens, WithoutAFieldThePictureIsTheImage) {
@@ -94,17 +78,6 @@ TEST_F(Lens, LightWithoutAlphaIsKept) {
   EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("glow.exr: 1 pixels have values that are not finite")));
 }
 
-TEST_F(Lens, EveryChannelIsInTheExr) {
-  write("scene.json", small_lens(R"("image": "checkerboard")"));
-  for (const std::string mode : {"gather", "scatter"}) {
-    const Image image = render({"integrator.mode=" + mode});
-    EXPECT_THAT(image.channels, ::testing::UnorderedElementsAreArray(lens_channels));  // The file sorts them.
-    for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
-    const std::vector<float> length = channel(image, "length"), end = channel(image, "end");
-    for (std::size_t i = 0; i < length.size(); ++i) EXPECT_EQ(length[i] > 0, end[i] == 0 || end[i] == 5) << i;
-  }
-}
-
 /// The greatest difference between the chromaticity of a pixel and that of the sum of all pixels.
 double colour_range(const Image& image) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -117,15 +90,6 @@ double colour_range(const Image& image) {
   for (const Eigen::Vector3d& pixel : pixels)
     if (pixel.norm() > 0.05) range = std::max(range, (pixel.normalized() - sum.normalized()).norm());
   return range;
-}
-
-TEST_F(Lens, AWhiteLineBecomesAFringeOnlyWhereThereAreManyWavelengths) {
-  write("scene.json", small_lens(R"("image": "line", "mode": "gather")"));
-  EXPECT_GT(colour_range(render({})), 0.3);
-  EXPECT_LT(
-      colour_range(render({"light.wavelengths.min=550", "light.wavelengths.max=550", "light.wavelengths.count=1"})),
-      1e-5);
-  EXPECT_LT(colour_range(render({"bending.rgb=[0.2,0.2,0.2]"})), 1e-5);
 }
 
 TEST_F(Lens, DepthsStandSideBySideAndLessOfTheVolumeBendsLess) {
@@ -176,21 +140,8 @@ TEST_F(Lens, OverlayDrawsOverThePictureAlone) {
   write("scene.json", small_lens(R"("image": "color_wheel", "mode": "gather")"));
   const Image plain = render({}), drawn = render({"integrator.overlay=grid"});
   EXPECT_NE(channel(plain, "R"), channel(drawn, "R"));
-  for (std::size_t i = 4; i < lens_channels.size(); ++i)
-    EXPECT_EQ(channel(plain, lens_channels[i]), channel(drawn, lens_channels[i])) << lens_channels[i];
-}
-
-TEST_F(Lens, TheImageIsSeenUprightFromBehindTheReceiver) {
-  // Red is on the viewer's left, above green. Light travels down, and the viewer looks up with +y upwards.
-  Image picture(2, 2, {"R", "G", "B"});
-  picture.pixel(0, 0)[0] = 1;
-  picture.pixel(0, 1)[1] = 1;
-  write_image(in_folder("photo.png"), picture);
-  write("scene.json", small_lens(R"("image": "photo.png")", no_bending));
-  const Image image = render({"receiver.resolution=[2,2]", "receiver.size=[2,2]"});
-  EXPECT_NEAR(image.pixel(0, 0)[0], 1, 1e-4);
-  EXPECT_NEAR(image.pixel(0, 1)[1], 1, 1e-4);
-  EXPECT_NEAR(image.pixel(1, 0)[0], 0, 1e-4);
+  for (const std::string& name : plain.channels)
+    EXPECT_TRUE(name.size() == 1 || channel(plain, name) == channel(drawn, name)) << name;
 }
 
 TEST_F(Lens, AlphaIsMultipliedInWhereTheFormatWantsItSo) {
@@ -214,33 +165,6 @@ TEST_F(Lens, StrongFieldsLeaveNothingThatIsNotFinite) {
     for (const std::string scale : {"300", "1e8"})
       render({"integrator.mode=" + mode, "field.scale=" + scale, "receiver.resolution=[12,8]",
               "bending.max_steps=20"});  // It expects finite values.
-}
-
-TEST_F(Lens, ImagesMuchWiderThanTheReceiverCostNoMore) {
-  write_image(in_folder("wide.png"), random_picture(1000, 4));
-  write("scene.json", small_lens(R"("image": "wide.png")"));
-  render({});
-  EXPECT_FALSE(statistics_.contains("power")) << "an image's rays carry none";
-  const double steps = statistics_["ray_steps"];
-  render({"integrator.image=grid"});
-  EXPECT_LT(steps, 1.5 * statistics_["ray_steps"].get<double>());
-}
-
-TEST_F(Lens, PhotonsAloneAreNoOutputOfALens) {
-  write("scene.json", small_lens(R"("image": "grid")"));
-  expect_error(2, "makes no photons", {}, {"out.vdb"});
-}
-
-TEST_F(Lens, ImagesThatCannotBeReadAreNamed) {
-  write("scene.json", small_lens(R"("image": "checkerboard")"));
-  write("empty.png", "");
-  write("text.png", "This is not a picture.");
-  write_image(in_folder("whole.png"), random_picture(40, 40));
-  write("cut.png", read_file(in_folder("whole.png")).substr(0, 2000));
-  std::filesystem::create_directory(in_folder("folder.png"));
-  for (const std::string file : {"missing.png", "empty.png", "text.png", "cut.png", "folder.png"})
-    expect_error(1, file, {"integrator.image=" + file});
-  expect_error(2, "before the receiver", {"integrator.image_plane.depth=3"});
 }
 
 }  // namespace

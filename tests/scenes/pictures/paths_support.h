@@ -15,10 +15,6 @@ constexpr const char* small_paths =
                             "filter": "box"},
              "camera": {"resolution": [24, 16]}})";
 
-inline const std::vector<std::string> all_channels{
-    "R",        "G",        "B",        "A",    "Z",     "normal.X", "normal.Y", "normal.Z",
-    "albedo.R", "albedo.G", "albedo.B", "path", "force", "length",   "samples",  "variance"};
-
 /// The covered area of the picture, in pixels.
 inline double covered(const Image& image) { return sum(channel(image, "A")); }
 

@@ -11,67 +11,6 @@ namespace {
 
 using namespace test;
 
-TEST_F(Paths, APictureWithEveryChannel) {
-  const Image image = render({}, {"out.png"});
-  EXPECT_THAT(image.channels, ::testing::UnorderedElementsAreArray(all_channels));
-  EXPECT_EQ(image.width, 24);
-  EXPECT_EQ(image.height, 16);
-  const Image shown = read_image(in_folder("out.png"));
-  EXPECT_EQ(shown.width, 24);
-  EXPECT_LT(*std::min_element(shown.pixels.begin(), shown.pixels.end()), 0.7f) << "something is on the white ground";
-}
-
-TEST_F(Paths, AuxiliaryPlanesSayWhatTheyShould) {
-  // Seen along y: first the tubes and the box, then only the tubes.
-  const Settings settings{transparent, "camera.projection=orthographic", "camera.direction=[0,1,0]"};
-  const Image with_box = render(settings);
-  const std::vector<float> any = channel(with_box, "A"), id = channel(with_box, "path"),
-                           force = channel(with_box, "force");
-  bool box_seen = false;
-  for (std::size_t i = 0; i < any.size(); ++i) {
-    EXPECT_EQ(id[i], std::floor(id[i]));
-    EXPECT_GE(id[i], -1);
-    EXPECT_LT(id[i], 16);
-    EXPECT_EQ(force[i] > 0, id[i] >= 0) << i;
-    if (any[i] == 0) {
-      EXPECT_EQ(id[i], -1) << i;
-    }
-    box_seen = box_seen || (any[i] > 0 && id[i] == -1);
-  }
-  EXPECT_TRUE(box_seen);
-
-  Settings alone = settings;
-  alone.push_back(without_box);
-  const Image image = render(alone);
-  const std::vector<float> alpha = channel(image, "A"), depth = channel(image, "Z"), path = channel(image, "path"),
-                           length = channel(image, "length"), variance = channel(image, "variance");
-  std::set<float> ids;
-  double normal_lengths = 0, tubes = 0;
-  for (std::size_t i = 0; i < alpha.size(); ++i) {
-    EXPECT_EQ(path[i] >= 0, alpha[i] > 0) << i;
-    EXPECT_TRUE(depth[i] > 0 || alpha[i] == 0) << i;
-    EXPECT_GE(length[i], 0);
-    EXPECT_LT(length[i], 4);
-    EXPECT_GE(variance[i], 0);
-    EXPECT_EQ(channel(image, "force")[i] > 0, alpha[i] > 0) << i;
-    if (alpha[i] == 0) continue;
-    ids.insert(path[i]);
-    const Eigen::Vector3f normal(channel(image, "normal.X")[i], channel(image, "normal.Y")[i],
-                                 channel(image, "normal.Z")[i]);
-    EXPECT_LE(normal.norm(), 1.0001f);
-    EXPECT_LT(normal.y(), 0) << "towards the viewer";
-    normal_lengths += static_cast<double>(normal.norm());
-    ++tubes;
-    for (const char* name : {"albedo.R", "albedo.G", "albedo.B"}) {
-      EXPECT_GE(channel(image, name)[i], 0);
-      EXPECT_LE(channel(image, name)[i], 1);
-    }
-  }
-  EXPECT_GE(ids.size(), 4u);
-  EXPECT_GT(normal_lengths / tubes, 0.7) << "means of unit vectors";
-  EXPECT_GT(greatest(length), 1);
-}
-
 TEST_F(Paths, TheSameBytesOnAnyNumberOfThreads) {
   const Settings names{"out.png", "linear.exr", "out.spectral.exr", "out.vtp", "out.ply"};
   std::vector<std::string> one;
@@ -141,18 +80,6 @@ TEST_F(Paths, PathsOfAFileGiveTheSamePictureWithoutTracing) {
   EXPECT_TRUE(read_file(in_folder("out.ply")) == tubes);
 }
 
-TEST_F(Paths, TracksAreWrittenAndRead) {
-  const Settings settings{"integrator.style=lines", "integrator.radius.typical=0.04", transparent};
-  const Image traced = render(settings, {"out.tck"});
-  EXPECT_EQ(read_file(in_folder("out.tck")).compare(0, 14, "mrtrix tracks\n"), 0);
-  std::filesystem::rename(in_folder("out.tck"), in_folder("kept.tck"));
-  Settings again = settings;
-  again.push_back("integrator.paths=kept.tck");
-  const Image read = render(again);
-  EXPECT_NEAR(covered(read), covered(traced), 0.5);  // The file has single precision.
-  EXPECT_EQ(greatest(channel(read, "force")), 0) << "tracks hold no tensors";
-}
-
 TEST_F(Paths, FilesOfPathsNeedNoPicture) {
   render({}, {"out.vtp", "out.ply", "out.png"});
   for (const std::string ending : {".ply", ".vtp"}) {
@@ -160,15 +87,6 @@ TEST_F(Paths, FilesOfPathsNeedNoPicture) {
     EXPECT_TRUE(read_file(in_folder("alone" + ending)) == read_file(in_folder("out" + ending))) << ending;
   }
   EXPECT_EQ(statistics_["seconds"]["draw"], 0);
-}
-
-TEST_F(Paths, TubesAreObstaclesOfAnotherScene) {
-  render({"integrator.seeds.count=1", "integrator.radius.typical=0.1"}, {"tube.ply"});
-  EXPECT_EQ(read_file(in_folder("tube.ply")).compare(0, 4, "ply\n"), 0);
-  const Settings settings{R"(obstacles=[{"file": "tube.ply"}])", transparent, seen_from_the_side, without_box};
-  Settings hiding = settings;
-  hiding.push_back("integrator.context.obstacles=false");
-  EXPECT_GT(covered(render(settings)), covered(render(hiding)) + 1);
 }
 
 TEST_F(Paths, WhatAUserCanGetWrong) {

@@ -17,8 +17,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
+#include "base/files/temporary_folder.h"
 #include "base/process/progress.h"
 #include "integrators/methods/read_scene.h"
 #include "renderer/images/image.h"
@@ -69,14 +69,6 @@ inline void expect_finite(const Image& image, const std::string& what = "") {
 /// Makes a folder for each test, with scene.json, and removes it after the test.
 class Pictures : public ::testing::Test {
  protected:
-  Pictures() {
-    std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::replace(name.begin(), name.end(), '/', '_');
-    folder_ = std::filesystem::path(::testing::TempDir()) / ("tensorray_" + std::to_string(getpid()) + "_" + name);
-    std::filesystem::create_directories(folder_);
-  }
-  ~Pictures() override { std::filesystem::remove_all(folder_); }
-
   std::filesystem::path in_folder(const std::string& name) const { return folder_ / name; }
 
   void write(const std::string& name, const std::string& text) const {
@@ -91,7 +83,7 @@ class Pictures : public ::testing::Test {
     if (threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
     SceneChanges changes{settings, {}};
     for (const std::string& output : outputs) changes.outputs.push_back(in_folder(output));
-    const SceneDescription description = read_scene(folder_ / scene_file, changes);
+    const SceneDescription description = read_scene(in_folder("") / scene_file, changes);
     OutputFiles files;
     if (!outputs.empty()) files = open_outputs(description.output);
     const Scene scene = load_scene(description, Progress());
@@ -135,7 +127,7 @@ class Pictures : public ::testing::Test {
   nlohmann::json statistics_;       ///< Of the last render.
 
  private:
-  std::filesystem::path folder_;
+  const TemporaryFolder folder_;
 };
 
 }  // namespace tensorray::test

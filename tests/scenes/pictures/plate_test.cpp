@@ -21,14 +21,6 @@ class PlatePicture : public Pictures {
   }
 };
 
-TEST_F(PlatePicture, IsTheSameWithAndWithoutSpectra) {
-  const Settings light{"field.scale=20", "light.wavelengths.count=16"};
-  const Image colors = render(light), bands = render(light, {"out.spectral.exr"});
-  ASSERT_EQ(colors.pixels.size(), bands.pixels.size());
-  for (std::size_t i = 0; i < bands.pixels.size(); ++i)
-    ASSERT_NEAR(colors.pixels[i], bands.pixels[i], 1e-6f * greatest(bands.pixels)) << i;
-}
-
 TEST_F(PlatePicture, WithoutAFieldItIsNeutralAndUniform) {
   remove_field();
   for (const std::string illuminant : {"D65", "A", "blackbody 3000"}) {
@@ -73,19 +65,6 @@ TEST_F(PlatePicture, RgbModeIsThePapers) {
   }
 }
 
-TEST_F(PlatePicture, OfOneBandIsNeutralIfItIsBroadAndColouredIfItIsNarrow) {
-  remove_field();
-  const auto middle = [&](const std::string& wavelengths) {
-    const Image image = render({"light.wavelengths=" + wavelengths});
-    return std::vector<float>(image.pixel(16, 16), image.pixel(16, 16) + 3);
-  };
-  const auto broad = middle(R"({"min": 380, "max": 730, "count": 1})");
-  EXPECT_NEAR(broad[0], broad[1], 1e-4);
-  EXPECT_NEAR(broad[2], broad[1], 1e-4);
-  for (const char* green : {R"({"min": 550, "max": 550, "count": 1})", R"({"min": 549, "max": 551, "count": 2})"})
-    EXPECT_GT(middle(green)[1], 2 * middle(green)[0]);
-}
-
 TEST_F(PlatePicture, IsSeenAlongTheLightAnywhere) {
   remove_field();
   const auto column_of_light = [&](Settings receiver) {
@@ -125,29 +104,6 @@ TEST_F(PlatePicture, HasStatisticsThatBalance) {
   for (const char* key : {"ray_steps", "tensor_samples", "peak_memory_bytes"}) EXPECT_GT(stats[key], 0) << key;
   for (const char* phase : {"load", "trace", "density", "color", "write"})
     EXPECT_GE(stats["seconds"][phase], 0) << phase;
-}
-
-TEST_F(PlatePicture, WithPixelsThatAreNoSquaresIsToldOf) {
-  const auto stretched = ::testing::Contains(::testing::HasSubstr("stretched"));
-  render({"receiver.size=[2,4]", "receiver.resolution=[20,40]"});
-  EXPECT_THAT(notes_, ::testing::Not(stretched));
-  render({"receiver.size=[2,4]", "receiver.resolution=40"});
-  EXPECT_THAT(notes_,
-              ::testing::Contains(::testing::HasSubstr("2 times as high as wide; [20, 40] pixels are squares")));
-}
-
-TEST_F(PlatePicture, HasTheShadowOfObstaclesAndStraightLightBesideACutVolume) {
-  write("wall.obj", "v -9 -9 -2.2\nv 9 -9 -2.2\nv 9 9 -2.2\nv -9 9 -2.2\nf 1 2 3 4\n");
-  render({R"(obstacles=[{"file":"wall.obj"}])"});
-  EXPECT_EQ(statistics_["photons"]["deposited"], 0);
-  EXPECT_GT(statistics_["photons"]["stopped"]["obstacle"], 0);
-
-  // The volume is cut to a small box in a corner. Light outside the box goes straight.
-  write("box.obj",
-        "v 0.5 0.5 -1\nv 0.9 0.5 -1\nv 0.9 0.9 -1\nv 0.5 0.9 -1\n"
-        "v 0.5 0.5 -0.5\nv 0.9 0.5 -0.5\nv 0.9 0.9 -0.5\nv 0.5 0.9 -0.5\n"
-        "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
-  EXPECT_NEAR(render({"field.bounds=box.obj"}).pixel(8, 24)[1], 1, 0.05);
 }
 
 }  // namespace

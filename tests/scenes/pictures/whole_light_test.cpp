@@ -46,44 +46,7 @@ TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   const Image backwards = render({none}), other_law = render({none, "integrator.conserve=radiance"});
   EXPECT_GT(mean(forwards, "G"), 0.2);
   EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
-  // Photons beside the other ways to find the lamp: whatever law light follows.
-  Settings few{"integrator.photons.per_pass=1024", "integrator.max_samples=48", "integrator.min_samples=48"};
-  const Image photons = render(few);
-  few.push_back("integrator.conserve=radiance");
-  const Image other_photons = render(few);
-  EXPECT_NE(photons.pixels, backwards.pixels);
-  EXPECT_NEAR(mean(photons, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
-  EXPECT_NEAR(mean(other_photons, "G"), mean(other_law, "G"), 0.03 * mean(other_law, "G"));
   EXPECT_GT(std::abs(mean(other_law, "G") / mean(backwards, "G") - 1), 0.1);
-}
-
-/// Photons and the flow map are two ways to the same light.
-TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
-  const Settings sets{
-      "lights=[{\"kind\":\"directional\",\"direction\":[0.1,0.15,-1],\"caustic\":\"map\"}]",
-      "integrator.max_samples=64",
-      "integrator.min_samples=64",
-      "integrator.max_depth=1",
-      "integrator.caustic={\"resolution\":256,\"rays\":40000,\"passes\":1}",
-      "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[6,6]},\"material\":{\"kind\":\"diffuse\"}}]",
-      "camera={\"projection\":\"orthographic\",\"position\":[0,0.001,-2.1],\"target\":[0,0,-2.6],\"height\":5,"
-      "\"resolution\":[32,32]}"};
-  Settings other = sets;
-  other.push_back("lights.0.caustic=photons");
-  const Image map = render(sets), photons = render(other);
-  other.push_back("integrator.photons.per_pass=2048");
-  const Image few = render(other);
-  const auto difference = [&](const Image& image) {
-    double sum = 0;
-    for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
-      sum += std::pow(image.pixels[i + 1] - map.pixels[i + 1], 2);
-    return std::sqrt(sum / image.width / image.height);
-  };
-  for (const char* channel : {"caustic.R", "caustic.G", "caustic.B"})
-    EXPECT_NEAR(mean(photons, channel), mean(map, channel), 0.01 * mean(map, channel)) << channel;
-  EXPECT_NEAR(mean(photons, "straight.G"), mean(map, "straight.G"), 1e-3 * mean(map, "straight.G"));
-  EXPECT_LT(difference(photons), 0.02 * mean(map, "G"));
-  EXPECT_LT(difference(photons), 0.7 * difference(few));
 }
 
 /// A plate that light meets before the middle of the volume, and one along the light, which both sides of light meet.
@@ -121,31 +84,6 @@ TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
     const Image with = expect_weak_as_none(sets);
     EXPECT_GT(mean(with, "G"), 0.01);
   }
-}
-
-/// Where aim finds some of a lamp's light within a bending field, photons beside it do not change the mean, beside a
-/// plate there that stops light. Without its photons the lamp is found because it stops the rays that are followed
-/// back.
-TEST_F(WholeScene, ALampWithinTheFieldHasTheSameLightWithPhotons) {
-  const Settings sets{
-      "field.scale=0.5",
-      "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[3,3]},\"material\":{\"kind\":\"diffuse\"}},"
-      "{\"plate\":{\"center\":[-0.5,0,-1.4],\"size\":[0.8,1.2]},\"material\":{\"kind\":\"diffuse\"}}]",
-      R"(lights=[{"kind":"area","center":[0.1,0.2,-0.5],"size":[0.5,0.5],"strength":10,"caustic":"photons"}])",
-      "integrator.bands=8",
-      "integrator.photons.per_pass=1024",
-      "integrator.max_samples=96",
-      "integrator.min_samples=128",
-      "integrator.max_depth=1",
-      R"(camera={"projection":"orthographic","position":[0,0.001,-2.2],"target":[0,0,-2.6],"height":2.4,)"
-      R"("resolution":[12,12]})"};
-  Settings none = sets;
-  none.push_back("integrator.photons.per_pass=0");
-  const Image with = render(sets), without = render(none);
-  EXPECT_NE(with.pixels, without.pixels);
-  EXPECT_GT(mean(without, "G"), 0.05);
-  for (const char* channel : {"R", "G", "B"})
-    EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.03) << channel;
 }
 
 /// A plate along the light in the lower half of the volume, and one below the volume. Light that hardly bends meets

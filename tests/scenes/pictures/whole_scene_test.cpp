@@ -43,23 +43,6 @@ TEST_F(WholeScene, AWeakFieldGivesThePictureWithoutIt) {
   expect_weak_as_none({"integrator.max_samples=64", "integrator.min_samples=64"}, 0.01);
 }
 
-/// Bodies below the volume, within it, and through its side, in light that goes through the volume and past it.
-TEST_F(WholeScene, AWeakFieldLightsBodiesAsIfItWereNotThere) {
-  write_roof("below.ply", 0.5, 0, -2.5);
-  write_roof("within.ply", -0.4, 0.3, -1);
-  write_roof("through.ply", 0, -1, -1.4);
-  const Settings sets{"objects=[{\"file\":\"below.ply\"},{\"file\":\"within.ply\"},{\"file\":\"through.ply\"}]",
-                      "lights=[{\"kind\":\"directional\",\"direction\":[0.3,0.2,-1]}]",
-                      "integrator.max_samples=64",
-                      "integrator.min_samples=64",
-                      "integrator.max_depth=1",
-                      "camera.position=[3,-6,3]",
-                      "camera.target=[0,0,-1.5]",
-                      "integrator.caustic={\"resolution\":256,\"rays\":20000,\"passes\":1}"};
-  const Image with = expect_weak_as_none(sets);
-  EXPECT_GT(mean(with, "caustic.G"), 0.3 * mean(with, "G"));
-}
-
 TEST_F(WholeScene, PathsAreObjects) {
   const std::string floor = "{\"plate\":{\"center\":[0,0,-2.6],\"size\":[8,8]}}";
   const Image with = render({"objects=[" + floor + ",{\"paths\":{\"count\":9}}]"});
@@ -88,37 +71,6 @@ TEST_F(WholeScene, AnEvenSkyThroughTheFieldIsEvenIfRadianceIsConserved) {
   // At the volume's edge, straight and bent samples of a pixel share the bands unevenly: noise, not a bias.
   EXPECT_LT(differs(render(radiance)), 0.02);
   EXPECT_GT(differs(render(sky)), 0.1);
-}
-
-TEST_F(WholeScene, StatisticsCountPhotonsAndBentRays) {
-  render({R"(lights=[{"kind":"directional","direction":[0.1,0,-1],"caustic":"photons"}])",
-          "integrator.photons.per_pass=100", "integrator.max_samples=16"});
-  const auto& stats = statistics_;
-  const auto& photons = stats["photons"];
-  const auto sum_of_ends = [](const auto& counts) {
-    std::uint64_t sum = 0;
-    for (const char* end : {"before", "landed", "escaped", "stopped"}) sum += counts[end].template get<std::uint64_t>();
-    return sum;
-  };
-  EXPECT_EQ(photons["emitted"], 4 * 100 * 16);
-  EXPECT_EQ(photons["emitted"], sum_of_ends(photons));
-  ASSERT_EQ(photons["passes"].size(), 4u);  // Of 4 samples each.
-  EXPECT_EQ(photons["passes"][1]["emitted"], 100 * 16);
-  EXPECT_GT(photons["passes"][1]["landed"], 0);
-  EXPECT_GE(stats["samples"], 4 * 40 * 32);
-  EXPECT_LE(stats["samples"], 16 * 40 * 32);
-  EXPECT_GT(stats["bent_rays"]["emitted"], 1000);
-  EXPECT_GT(stats["ray_steps"], stats["bent_rays"]["emitted"]);
-  EXPECT_GT(stats["tensor_samples"], 0);
-}
-
-TEST_F(WholeScene, SaysWhenPhotonsAreLost) {
-  const auto lost = ::testing::Contains(::testing::HasSubstr("of the photons could not be followed"));
-  const std::string lights = "lights=[{\"kind\":\"directional\",\"caustic\":\"photons\"}]";
-  render({lights, "bending.max_steps=5"});
-  EXPECT_THAT(notes_, lost);
-  render({lights, "bending.max_steps=20000"});
-  EXPECT_THAT(notes_, ::testing::Not(lost));
 }
 
 TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
@@ -180,15 +132,6 @@ TEST_F(WholeScene, EmptyListsMeanNone) {
   const Settings paths{"integrator.type=path_tracing", "integrator.background_color=[0,0,0]"};
   EXPECT_EQ(mean(render({paths[0], paths[1], "lights=[]"}), "G"), 0);
   EXPECT_GT(mean(render(paths), "G"), 0);
-}
-
-TEST_F(WholeScene, SmoothAnglesRoundEdges) {
-  write_roof("roof.ply", 0, 0, -2.2);
-  const auto roof = [&](const std::string& angle) {
-    return render({"objects=[{\"file\":\"roof.ply\",\"smooth_angle\":" + angle + "}]"});
-  };
-  EXPECT_NEAR(mean(roof("0"), "G"), mean(roof("\"auto\""), "G"), 1e-3);  // The file has no normals.
-  EXPECT_NE(roof("0").pixels, roof("180").pixels);
 }
 
 TEST_F(WholeScene, RefusesMoreLightThanFitsIntoMemory) {

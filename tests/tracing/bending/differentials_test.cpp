@@ -199,14 +199,5 @@ TEST(RayDifferential, LengthIsThatOfTheWay) {
   EXPECT_NEAR(arc.length[0], angle / 0.5, 1e-4);
 }
 
-TEST(RayDifferential, BatchesHaveThemForAllRaysOrNone) {
-  const TensorField field = test::constant_field(Eigen::Matrix3d::Zero());
-  RayBatch batch;
-  batch.add({0, 0, 0}, {0, 0, 1}, 1);
-  batch.add({0, 0, 0}, {0, 0, 1}, 1);
-  batch.differentials.resize(1);
-  EXPECT_THROW(trace(field, Geometry(test::surfaces_of(field)), {}, batch), std::invalid_argument);
-}
-
 }  // namespace
 }  // namespace tensorray

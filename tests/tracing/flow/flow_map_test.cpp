@@ -97,28 +97,6 @@ TEST(FlowMap, RaysAreRememberedOnlyWhereTheyMeetNothingElse) {
   EXPECT_FALSE(serves(make_bench(lens, plate_at(3, 4, 64), extra)));
 }
 
-TEST(FlowMap, CoversTheApertureOnce) {
-  for (const Vector3d& direction : {Vector3d(0, 0, -1), Vector3d(0.3, 0.2, -1), Vector3d(1, 1, -1)}) {
-    Plate plate = plate_across(direction, 3);
-    plate.size = {4, 4};
-    plate.resolution = {64, 64};
-    const FlowBench bench = make_bench(lens, plate, {}, 9, direction);
-    const FlowMap map = map_of(bench, single(0.3));
-    double covered = 0;
-    for (const FlowTriangle& triangle : map.triangles) {
-      EXPECT_GT(triangle.area, 0);
-      covered += triangle.area;
-    }
-    EXPECT_NEAR(covered, area(bench.beam.aperture), 1e-9);
-    // Each triangle has three edges.
-    std::vector<int> sides(map.triangles.size());
-    for (const FlowEdge& edge : map.edges)
-      for (const std::uint32_t triangle : {edge.along, edge.against})
-        if (triangle != FlowEdge::none) ++sides[triangle];
-    for (const int count : sides) ASSERT_EQ(count, 3);
-  }
-}
-
 TEST(FlowMap, UndisturbedLightIsExactlyOne) {
   const FlowBench bench = make_bench(zero, plate_at(2, 1.5, 48));  // The beam is wider than the plate.
   const Caustic caustic = caustic_of(bench, map_of(bench, single(0.3)));

@@ -85,13 +85,6 @@ TEST(WavelengthPrediction, ThreeSamplesNeedParentsThatAgree) {
   EXPECT_EQ(error_of(apart, both, 16, 0.1f), -1);
 }
 
-TEST(WavelengthPrediction, AJumpIsNoticed) {
-  const FlowMap map = small_map({0, 1, 0.5}, [](double x, double t) {
-    return Vector2f(static_cast<float>(40 + x + (t > 0.6 && x == 0.5 ? 1 : 0)), static_cast<float>(50 * t));
-  });
-  for (const std::size_t step : {16, 8, 4, 2}) EXPECT_EQ(error_of(map, both, step, 0.03f), -1) << step;
-}
-
 /// Light that leaves by another face from sample 12 on.
 TEST(WavelengthPrediction, AKinkNeedsAllSamplesOnlyWhereItIs) {
   FlowMap map = small_map({0, 1, 0.5}, [](double x, double t) {

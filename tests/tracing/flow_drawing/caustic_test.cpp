@@ -94,27 +94,6 @@ TEST(Caustic, CuspHasItsClosedForm) {
   EXPECT_LT(cusp_error(256), cusp_error(128) / 2);
 }
 
-/// Away from folds the error is of second order in the size of the quads.
-TEST(Caustic, IsOfSecondOrderWhereNothingFolds) {
-  const auto error = [](int count) {
-    const FlowMap map = lattice_map(count, 0, 1, [](const Vector2d& at) {
-      return Vector2d(5 + 40 * (at.x() + 0.3 * at.x() * at.x()), 4 + 54 * at.y());
-    });
-    std::vector<double> exact(pixels * pixels);
-    const auto start = [](double x) {  // The inverse of the map.
-      const double s = std::clamp((x - 5) / 40, 0.0, 1.3);
-      return (std::sqrt(1 + 1.2 * s) - 1) / 0.6;
-    };
-    for (int y = 4; y < 58; ++y)
-      for (int x = 0; x < pixels; ++x)
-        exact[static_cast<std::size_t>(y) * pixels + static_cast<std::size_t>(x)] = (start(x + 1) - start(x)) / 54;
-    return distance(map, unit_plate(), exact);
-  };
-  const double coarse = error(128), fine = error(512);
-  EXPECT_LT(coarse, 1e-3);
-  EXPECT_LT(fine, coarse / 10);  // 16 for second order.
-}
-
 /// The light of one band between two samples, of which each vertex moves by `moves`, and that of many narrow bands.
 std::pair<Film, Film> swept_and_narrow(const std::function<Vector2d(const Vector2d&)>& moves, int bands) {
   FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(5 + 20 * at.x(), 5 + 40 * at.y()); });

@@ -60,23 +60,6 @@ double power(const FlowIrradiance& landed, int band) {
   return sum * landed.plate.pixel_area();
 }
 
-TEST(FlowIrradianceTest, StraightLightFillsTheShadowOfTheVolume) {
-  const TensorField field = constant_field(Matrix3d::Zero());
-  const Vector3d direction(0.5, 0, -1);
-  const FlowIrradiance landed = land(field, sun(direction), floor_plate(12));
-  // The shadow is the hull of the bottom and the top of the cube, moved along the light.
-  const auto irradiance = [&](double x, double y) {
-    const Eigen::Vector2i at = landed.plate.to_pixel({x, y, -1.5}).array().floor().cast<int>();
-    if (at.minCoeff() < 0 || (at.array() >= landed.plate.resolution.array()).any()) return 0.0;
-    return landed.irradiance.plane(1)[at.y() * landed.irradiance.width + at.x()];
-  };
-  EXPECT_NEAR(irradiance(0.7, 0), -direction.normalized().z(), 2e-3);
-  EXPECT_NEAR(irradiance(-0.6, 0.9), -direction.normalized().z(), 2e-3);
-  EXPECT_EQ(irradiance(-0.85, 0), 0);
-  EXPECT_EQ(irradiance(0.7, 1.1), 0);
-  EXPECT_NEAR(power(landed, 0), 2 * 3 * -direction.normalized().z(), 0.01);
-}
-
 LandingLight lamp(const Vector3d& source) {
   LandingLight light = sun({0, 0, -1});
   light.source = source;

@@ -87,20 +87,6 @@ TEST(FlowView, LinearMapsAreExactAndCoverPointsOnce) {
     }
 }
 
-/// The same map from the side of its starts.
-TEST(FlowView, StartsShowTheirLandings) {
-  const auto landing = [](const Vector2d& start) -> Vector2d {
-    return {30 * start.x() + 4 * start.y(), 20 * start.y() - 8};
-  };
-  const std::vector<FlowPoint> seen = draw(lattice(landing, 5), starts_of(33));
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    const Vector2d start = starts_of(33).to_pixel.inverse() * middle(i, 33);
-    ASSERT_EQ(seen[i].end, RayEnd::plate);
-    ASSERT_EQ(seen[i].sheets, 1);
-    EXPECT_LT((seen[i].other.cast<double>() - landing(start)).norm(), 1e-5);
-  }
-}
-
 /// Between corners the map is quadratic, so that halving quads divides the error within by eight.
 TEST(FlowView, SmoothMapsAreOfThirdOrder) {
   const auto landing = [](const Vector2d& at) -> Vector2d {

@@ -56,32 +56,6 @@ PathPoints all_points(const Traced& traced) {
   return points;
 }
 
-TEST_P(PathThinning, SamplesAreThePointsOfTheRay) {
-  const Traced traced = bent_ray();
-  const PathPoints points = all_points(traced);
-  ASSERT_GT(points.size(), 60u);
-  PathSamples samples;
-  sample_path(traced.field, traced.ray, true, samples);
-  ASSERT_EQ(samples.count, points.size());
-  TensorSampler sampler(traced.field);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const auto at = [&](const std::vector<float>& values, std::size_t component) {
-      return double{values[component * samples.room + i]};
-    };
-    const auto moved = [&](std::size_t k) -> Vector3d {
-      return Vector3d(at(samples.positions, 0), at(samples.positions, 1), at(samples.positions, 2)) -
-             Vector3d(samples.positions[k], samples.positions[samples.room + k],
-                      samples.positions[2 * samples.room + k]);
-    };
-    EXPECT_LT((mean_edge * moved(0) - (points[i].position - points[0].position)).norm(), 1e-5 * mean_edge);
-    EXPECT_NEAR(at(samples.lengths, 0) + at(samples.more, 0), points[i].length - points[0].length, 1e-9);
-    const Matrix3d T = sampler.at(points[i].position) / traced.field.max_norm();
-    for (std::size_t c = 0; c < 9; ++c) {
-      EXPECT_NEAR(at(samples.tensors, c), points[i].in_field ? T.data()[c] : 0, 1e-5);
-    }
-  }
-}
-
 /// The error of each point between two that stay, in the tolerances' units, in double precision.
 TEST_P(PathThinning, KeepsItsTolerances) {
   for (const double flexibility : {0.05, 0.2, 0.8}) {
@@ -105,18 +79,6 @@ TEST_P(PathThinning, KeepsItsTolerances) {
                   1.001 * 0.02 * std::max({from.norm(), to.norm(), here.norm()}));
       }
   }
-}
-
-TEST_P(PathThinning, KeepsAllPointsIfNoErrorIsAllowed) {
-  const Traced traced = bent_ray();
-  PathSamples samples;
-  sample_path(traced.field, traced.ray, true, samples);
-  EXPECT_GT(thinned(samples, 0, 0.02).size(), samples.count - 3);
-  EXPECT_GT(thinned(samples, 0.05, 0).size(), samples.count - 3);
-  sample_path(traced.field, traced.ray, false, samples);
-  EXPECT_TRUE(samples.tensors.empty());
-  EXPECT_GT(thinned(samples, 0, 0).size(), samples.count - 3);
-  EXPECT_EQ(thinned(samples, 1e6, 0).size(), 2u);
 }
 
 }  // namespace

@@ -65,19 +65,5 @@ TEST(BrickIndex, HasNothingAnywhereElse) {
         for (const int z : {least, 0, 1, greatest}) EXPECT_EQ(index.find({x, y, z}), BrickIndex::missing);
 }
 
-TEST(BrickIndex, MemoryFollowsTheBricks) {
-  std::vector<Vector3i> bricks;
-  for (int i = 0; i < 1000; ++i) bricks.emplace_back(i, 37 * i % 1000, 53 * i % 1000);
-  for (int spread = 1; spread < 1 << 20; spread *= 2) {
-    std::vector<Vector3i> spaced;
-    for (const Vector3i& brick : bricks) spaced.emplace_back(spread * brick / 16);
-    std::sort(spaced.begin(), spaced.end(), [](const Vector3i& a, const Vector3i& b) {
-      return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
-    });
-    spaced.erase(std::unique(spaced.begin(), spaced.end()), spaced.end());
-    EXPECT_LE(BrickIndex(spaced).memory_bytes(), 256 * spaced.size() + 256);
-  }
-}
-
 }  // namespace
 }  // namespace tensorray

@@ -141,30 +141,6 @@ TEST(CubicField, InterpolatesItsVoxels) {
     }
 }
 
-/// Beside inactive voxels: a step from a constant to nothing.
-TEST(CubicField, AStepHardlyRings) {
-  const AlignedBox3i box(Vector3i::Zero(), Vector3i(23, 23, 23));
-  const auto one = [](const Vector3i&) { return Matrix3d(Matrix3d::Constant(1)); };
-  const TensorField field(masked_grid(
-                              box, [](const Vector3i& v) { return v.x() >= 12 || v.x() == 0; }, one),
-                          fading);
-  TensorSampler sampler(field);
-  for (double x = 3; x < 23; x += 1.0 / 16) {
-    const double value = sampler.at({x, 11.3, 9.8})(0, 1);
-    EXPECT_LT(value, 1.1) << x;
-    EXPECT_GT(value, -0.1) << x;
-    if (x >= 14) {
-      EXPECT_NEAR(value, 1, 0.01) << x;
-    }
-    if (x <= 10) {
-      EXPECT_NEAR(value, 0, 1e-6) << x;
-    }
-    if (x <= 12) {
-      EXPECT_GE(value, -1e-6) << x;
-    }
-  }
-}
-
 /// The same beside a body of any shape: its voxels keep their values, and nothing is far from 0 and 1 but beside edges.
 TEST(CubicField, ABallHardlyRings) {
   const AlignedBox3i box(Vector3i::Zero(), Vector3i(31, 31, 31));

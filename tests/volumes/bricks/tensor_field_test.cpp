@@ -57,41 +57,6 @@ TEST(TensorField, InterpolatesTrilinearFunctionsExactlyAcrossBricks) {
   EXPECT_EQ(sampler.samples(), 2000u);
 }
 
-TEST(TensorField, GradientIsTheDerivativeOfTheInterpolation) {
-  const TensorGrid grid = dense_grid(box({0, 0, 0}, {20, 20, 20}), oblique(),
-                                     [](const Vector3i& i) { return trilinear(i.cast<double>() / 8); });
-  const TensorField field(grid);
-  TensorSampler sampler(field);
-  for (const Vector3d& index : points_in({Vector3d::Constant(0.1), Vector3d::Constant(19.9)}, 200)) {
-    const Vector3d world = oblique() * index;
-    Eigen::Matrix<double, 3, 2> along;
-    along << Vector3d(0.5, -1, 2), Vector3d(1, 0.25, 0);
-    std::array<Matrix3d, 2> derivatives;
-    EXPECT_TRUE(sampler.at(world, along, derivatives).isApprox(sampler.at(world), 1e-12));
-    for (int i = 0; i < 2; ++i) {
-      // Derivatives of the analytic function along the index axes: central differences are exact, because it is linear
-      // along each.
-      const double h = 1e-4;
-      const Vector3d by_index = oblique().linear().inverse() * along.col(i);
-      Matrix3d expected = Matrix3d::Zero();
-      for (int axis = 0; axis < 3; ++axis) {
-        const Vector3d step = h * Vector3d::Unit(axis);
-        expected += by_index[axis] * (trilinear((index + step) / 8) - trilinear((index - step) / 8)) / (2 * h);
-      }
-      EXPECT_LT((derivatives[static_cast<std::size_t>(i)] - expected).norm(), 1e-4 * expected.norm() + 1e-5);
-    }
-  }
-}
-
-TEST(TensorField, ExtentIsSpannedByActiveVoxels) {
-  const TensorField field(dense_grid(box({2, 3, 4}, {10, 20, 30}), Eigen::Affine3d::Identity(),
-                                     [](const Vector3i&) { return Matrix3d::Identity(); }));
-  EXPECT_EQ(field.index_bounds().min(), Vector3d(2, 3, 4));
-  EXPECT_EQ(field.index_bounds().max(), Vector3d(10, 20, 30));
-  EXPECT_TRUE(field.contains({2, 3, 4}));
-  EXPECT_FALSE(field.contains({1.999, 3, 4}));
-}
-
 TEST(TensorField, InactiveVoxelsCountAsZero) {
   TensorGrid grid = dense_grid(box({0, 0, 0}, {2, 2, 2}), Eigen::Affine3d::Identity(),
                                [](const Vector3i&) { return Matrix3d::Identity(); });
@@ -206,16 +171,6 @@ TEST(TensorField, RefusesWhatCannotBeTraced) {
   EXPECT_THROW(TensorField{flat}, std::invalid_argument);
 }
 
-TEST(TensorGrid, DenseGridHasEveryVoxelOfItsBox) {
-  const TensorGrid grid = dense_grid(box({-9, 0, 7}, {8, 0, 8}), Eigen::Affine3d::Identity(),
-                                     [](const Vector3i& i) { return Matrix3d(i.x() * Matrix3d::Identity()); });
-  EXPECT_EQ(grid.active_voxels(), 18u * 1 * 2);
-  EXPECT_EQ(grid.active_box().min(), Vector3i(-9, 0, 7));
-  EXPECT_EQ(grid.active_box().max(), Vector3i(8, 0, 8));
-  for (const TensorBlock& block : grid.blocks)
-    for (int i = 0; i < 3; ++i) EXPECT_EQ(block.origin[i] % TensorBlock::size, 0);
-}
-
 TEST(TensorGrid, NonFiniteVoxelsAreRemovedAndCounted) {
   const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
   TensorGrid grid = dense_grid(box({0, 0, 0}, {9, 0, 0}), Eigen::Affine3d::Identity(), [&](const Vector3i& i) {
@@ -225,18 +180,6 @@ TEST(TensorGrid, NonFiniteVoxelsAreRemovedAndCounted) {
   EXPECT_EQ(grid.active_voxels(), 7u);
   EXPECT_EQ(grid.blocks.size(), 1u);  // The second block has no active voxel left.
   EXPECT_EQ(remove_non_finite(grid), 0u);
-}
-
-TEST(TensorGrid, AsymmetryTellsSymmetricFromAntisymmetric) {
-  const auto of = [](const Matrix3d& tensor) {
-    return asymmetry(
-        dense_grid(box({0, 0, 0}, {3, 3, 3}), Eigen::Affine3d::Identity(), [&](const Vector3i&) { return tensor; }));
-  };
-  Matrix3d skew;
-  skew << 0, 1, -2, -1, 0, 3, 2, -3, 0;
-  EXPECT_EQ(of(Vector3d(1, 2, 3).asDiagonal().toDenseMatrix()), 0);
-  EXPECT_NEAR(of(skew), 2, 1e-12);
-  EXPECT_EQ(of(Matrix3d::Zero()), 0);
 }
 
 }  // namespace

@@ -25,17 +25,6 @@ std::vector<Part> walk(const Vector3d& a, const Vector3d& b, const AlignedBox3d&
 
 const AlignedBox3d bounds(Vector3d(-3, 2, 0), Vector3d(9, 11, 7));
 
-TEST(VoxelWalk, CrossesVoxelsInOrder) {
-  const std::vector<Part> parts = walk({0, 4, 3}, {2, 4, 3}, bounds);
-  ASSERT_EQ(parts.size(), 3u);
-  const double cuts[] = {0, 0.25, 0.75, 1};
-  for (int i = 0; i < 3; ++i) {
-    EXPECT_EQ(parts[i].voxel, Vector3i(i, 4, 3));
-    EXPECT_EQ(parts[i].from, cuts[i]);
-    EXPECT_EQ(parts[i].to, cuts[i + 1]);
-  }
-}
-
 TEST(VoxelWalk, PartsAdjoinLieInTheirVoxelsAndAreAllThatIsInTheBounds) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> position(-6, 14);
@@ -75,11 +64,6 @@ TEST(VoxelWalk, APointIsInOneVoxel) {
   EXPECT_EQ(parts[0].voxel, Vector3i(1, 4, 3));
   EXPECT_EQ(parts[0].from, 0);
   EXPECT_EQ(parts[0].to, 1);
-}
-
-TEST(VoxelWalk, ASegmentBesideTheBoundsHasNoPart) {
-  EXPECT_TRUE(walk({-4, 4, 3}, {-3.5, 5, 3}, bounds).empty());
-  EXPECT_TRUE(walk({20, 4, 3}, {10, 4, 3}, bounds).empty());
 }
 
 TEST(VoxelWalk, AnAxisOfOneVoxelIsCrossedWhole) {

@@ -36,16 +36,6 @@ Matrix3d sampled(const Generator& generator, const Vector3d& position) {
   return at(generate(generator, grid), {0, 0, 0});
 }
 
-TEST(PointLoad, TheLoadIsOneVoxelAboveTheBox) {
-  const PointLoad load;
-  const GridSettings settings = default_grid(load, 21);
-  EXPECT_EQ(settings.resolution, Eigen::Vector3i(21, 21, 20));
-  const TensorGrid grid = generate(load, settings);
-  EXPECT_LE((grid.to_world.linear() - 0.1 * Matrix3d::Identity()).norm(), 1e-14);
-  EXPECT_LE((grid.to_world * Vector3d(20, 20, 19) - Vector3d(1, 1, -0.1)).norm(), 1e-14);
-  EXPECT_LT(at(grid, {10, 10, 19})(2, 2), 0);  // Compression under the load.
-}
-
 /// Points, or discs of their radius.
 TEST(Loads, HaveTheStressOfEach) {
   for (const double radius : {0.0, 0.2}) {
@@ -126,16 +116,6 @@ TEST(Vortex, IsTheGradientOfTheBurgersVortex) {
   for_each(generate(vortex, axis), check);
 }
 
-TEST(Helix, IsSymmetricWithEigenvaluesInRange) {
-  const Helix helix;
-  for_each(generate(helix, default_grid(helix, 33)), [&](const Vector3d& p, const Matrix3d& tensor) {
-    ASSERT_EQ(tensor, Matrix3d(tensor.transpose()));
-    const Eigen::Vector3cd values = eigenvalues(tensor);
-    ASSERT_LE(values[0].real(), helix.along + 1e-6) << p.transpose();
-    ASSERT_GE(values[2].real(), helix.across - 1e-6) << p.transpose();
-  });
-}
-
 TEST(Helix, HasItsEigenvaluesOnTheCurve) {
   const Helix helix;
   for (const double angle : {0.0, 0.7, 2.0, 4.0, 9.0}) {
@@ -178,12 +158,6 @@ TEST(Generators, KindsAndGeneratorsMatch) {
     EXPECT_NEAR(voxel.x(), voxel.y(), 1e-14);
     EXPECT_NEAR(voxel.x(), voxel.z(), 1e-14);
   }
-}
-
-TEST(Generators, UnknownKindListsTheKinds) {
-  EXPECT_THAT([] { generator_of("vortx"); },
-              testing::ThrowsMessage<std::invalid_argument>(
-                  testing::AllOf(testing::HasSubstr("vortx"), testing::HasSubstr("two_point_load, constant"))));
 }
 
 TEST(Generators, MetadataNamesEveryParameter) {

@@ -93,19 +93,5 @@ TEST(SampleTensors, AgreesWithTheSamplerOfOnePoint) {
     }
 }
 
-TEST(BrickPoint, KeepsPositionsInAndBesideTheExtent) {
-  const TensorField field = uneven_field({-11, -3, 5}, {9, 14, 30});
-  for (const Vector3d& index : index_points(field, 200)) {
-    const BrickPoint point = brick_point(field, index);
-    EXPECT_LT((index_position(point) - index).norm(), 2e-6);
-    const Vector3i brick(2, -1, 0);
-    EXPECT_LT((place_from(brick, point).cast<double>() - (index - 8 * brick.cast<double>())).norm(), 1e-5);
-    for (int axis = 0; axis < 3; ++axis) {
-      EXPECT_GE(8 * point.brick[axis], field.voxels().min()[axis] - 7);
-      EXPECT_LT(8 * point.brick[axis], field.voxels().max()[axis]);
-    }
-  }
-}
-
 }  // namespace
 }  // namespace tensorray

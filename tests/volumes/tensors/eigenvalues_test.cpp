@@ -222,18 +222,6 @@ TEST(Eigenvalues, NearDefectiveTensorsStayBounded) {
   }
 }
 
-TEST(Eigenvalues, RefusesModesThatAreNotAFunction) {
-  EXPECT_THROW(with_eigenvalues(Matrix3d::Identity(), Eigenvalues::raw), std::invalid_argument);
-  EXPECT_THROW(with_eigenvalues(Matrix3d::Identity(), Eigenvalues::automatic), std::invalid_argument);
-}
-
-TEST(Eigenvalues, AreSortedByRealPart) {
-  const Eigen::Vector3cd real = eigenvalues(Vector3d(1, 3, -2).asDiagonal());
-  EXPECT_EQ(real, Eigen::Vector3cd(3, 1, -2));
-  const Eigen::Vector3cd pair = eigenvalues(matrix({1, -2, 0, 2, 1, 0, 0, 0, 0.5}));
-  EXPECT_LE((pair - Eigen::Vector3cd(Complex(1, 2), Complex(1, -2), 0.5)).norm(), 1e-14);
-}
-
 TensorGrid grid_of(const std::function<Matrix3d(const Eigen::Vector3i&)>& value) {
   return dense_grid({Eigen::Vector3i(-3, 0, 5), Eigen::Vector3i(20, 17, 30)}, Eigen::Affine3d::Identity(), value);
 }

@@ -26,18 +26,6 @@ Matrix3d cross_matrix(const Vector3d& axis) {
 
 double of(const std::string& name, const Matrix3d& tensor) { return invariant(invariant_of(name), tensor); }
 
-TEST(InvariantTest, NamesAndEnumerationAgreeAndUnknownNamesListThem) {
-  EXPECT_EQ(invariant_of("norm"), Invariant::norm);
-  EXPECT_EQ(invariant_of("asymmetry"), Invariant::asymmetry);
-  EXPECT_EQ(invariant_of("max_shear"), Invariant::max_shear);
-  try {
-    invariant_of("anisotropy");
-    FAIL() << "nothing was thrown";
-  } catch (const std::invalid_argument& error) {
-    for (const std::string& name : invariant_names()) EXPECT_THAT(error.what(), ::testing::HasSubstr(name));
-  }
-}
-
 TEST(InvariantTest, DiagonalTensors) {
   const Matrix3d tensor = diagonal(2, -3, 6);
   EXPECT_DOUBLE_EQ(of("norm", tensor), 7);

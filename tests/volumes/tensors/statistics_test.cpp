@@ -74,17 +74,6 @@ TEST(FieldStatistics, EigenvaluesAndFractions) {
   EXPECT_NEAR(s.absolute_loss, 0.1 * 18 / (0.1 * 36 + 0.9 * 25), 1e-12);
 }
 
-TEST(FieldStatistics, DeviatorIsTheSpectralNorm) {
-  const TensorGrid grid = stretched_grid([](const Vector3i& i) {
-    return matrix_of_rows({0, 0, 0.1 * i.y(), 0, 0, 0, 0, 0, 0});
-  });
-  const FieldStatistics s = field_statistics(grid);
-  EXPECT_NEAR(s.deviator_max, 0.9, 1e-6);
-  EXPECT_NEAR(s.absolute_loss, 1, 1e-12);  // Simple shear vanishes.
-  EXPECT_EQ(s.complex_fraction, 0);
-  EXPECT_EQ(s.negative_fraction, 0);
-}
-
 TEST(FieldStatistics, LeavesNonFiniteVoxelsOut) {
   const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
     return (i.x() > 4 ? std::numeric_limits<double>::quiet_NaN() : 2.0) * Matrix3d::Identity();

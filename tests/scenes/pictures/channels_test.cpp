@@ -1,0 +1,57 @@
+// The channels of pictures: docs/scenes.md lists those of each method.
+
+#include <regex>
+
+#include "integrators/methods/read_scene.h"
+#include "scenes/outputs/channel_table.h"
+#include "tests/data_folder.h"
+#include "tests/scenes/pictures/pictures.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+/// The names in the tables of channels of the documents' section about a method: "| `texture.s`, `.t` | ... |".
+Settings documented_channels(const std::string& method) {
+  std::ifstream file(source_folder() / "docs" / "scenes.md");
+  const std::regex quoted("`([^`]+)`");
+  Settings names;
+  bool is_in_section = false, is_in_table = false;
+  for (std::string line, layer; std::getline(file, line);) {
+    if (line.rfind("## ", 0) == 0 || line.rfind("### ", 0) == 0) is_in_section = line == "### " + method;
+    if (line.rfind('|', 0) != 0) is_in_table = false;
+    const std::string cell = line.substr(0, line.find(" | "));
+    for (std::sregex_iterator name(cell.begin(), cell.end(), quoted), end; is_in_table && name != end; ++name) {
+      const std::string text = (*name)[1];
+      if (text[0] != '.') layer = text.substr(0, text.rfind('.'));
+      names.push_back(text[0] == '.' ? layer + text : text);
+    }
+    if (is_in_section && line == "| channel | meaning |") is_in_table = true;
+  }
+  return names;
+}
+
+using Channels = Pictures;
+
+TEST_F(Channels, DocumentsListThoseOfEachMethod) {
+  write("scene.json", R"({
+    "field": {"generate": {"kind": "helix", "resolution": 9}, "scale": 0.6},
+    "light": {"photons": 500, "wavelengths": {"count": 4}},
+    "receiver": {"resolution": [8, 8]}, "camera": {"resolution": [8, 8]},
+    "lights": [{"kind": "constant", "group": "GROUP"}, {"kind": "directional"}],
+    "integrator": {"type": "lens", "bands": 8, "max_samples": 1, "min_samples": 1, "seeds": {"count": 4},
+                   "stretch": {"pixels": 8}, "caustic": {"resolution": 16, "rays": 100, "passes": 1}}})");
+  for (const auto& method : default_scene().integrator.methods) {
+    const std::string name = method->name();
+    Settings expected = documented_channels(name);
+    EXPECT_FALSE(expected.empty()) << name;
+    // Those of a plate's light are beside its colours, those of "scene" beside those of all pictures of surfaces.
+    const Settings others = name == "scene" ? documented_channels("path_tracing") : Settings{"R", "G", "B"};
+    if (name == "scene" || name == "photon_distribution") expected.insert(expected.end(), others.begin(), others.end());
+    EXPECT_THAT(render({"integrator.type=" + name}).channels, ::testing::UnorderedElementsAreArray(expected)) << name;
+  }
+}
+
+}  // namespace
+}  // namespace tensorray
