@@ -19,7 +19,7 @@
 #include "integrators/lens/lens_map.h"
 #include "renderer/film/film.h"
 #include "renderer/textures/texture.h"
-#include "tracing/bending/light_channel.h"
+#include "tracing/bending/bending.h"
 #include "tracing/flow/flow_map.h"
 
 namespace tensorray {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/process/archive.h"
-#include "tracing/bending/ray_record.h"
+#include "tracing/bending/bending.h"
 #include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/scalar_grid.h"

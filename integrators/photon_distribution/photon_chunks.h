@@ -21,9 +21,6 @@
 #include "renderer/lights/beam.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
-#include "tracing/bending/light_channel.h"
-#include "tracing/bending/ray_record.h"
-#include "tracing/bending/side_faces.h"
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {

@@ -13,7 +13,6 @@
 #include "renderer/lights/beam.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
-#include "tracing/bending/light_channel.h"
 #include "volumes/grids/scalar_grid.h"
 
 namespace tensorray {

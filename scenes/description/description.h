@@ -24,7 +24,6 @@
 #include "scenes/description/spectrum_description.h"
 #include "scenes/keys/generate_grid.h"
 #include "tracing/bending/bending.h"
-#include "tracing/bending/flexibility.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/eigenvalues.h"
 

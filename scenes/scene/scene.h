@@ -14,7 +14,6 @@
 #include "scenes/description/description.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
-#include "tracing/bending/light_channel.h"
 #include "tracing/scale/auto_scale.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/tensors/eigenvalues.h"

@@ -1,6 +1,7 @@
 #pragma once
 /// @file tracing/bending/bending.h
-/// Rays, and settings of how they are followed. In a tensor field light bends by (Zheng and Pang 2003, Eq. 5)
+/// Rays: settings of how they are followed, their records and their ends. In a tensor field light bends by (Zheng and
+/// Pang 2003, Eq. 5)
 ///   P' = V,  V' = σ (T V − (VᵀTV) V),  |V| = 1, with σ = s · scale.
 /// Only bending_steps.h and, for packets, packet_step-inl.h contain this rule.
 
@@ -8,14 +9,29 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "volumes/bricks/brick_point.h"
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
+
+/// How strongly light of each wavelength bends: s(λ) = a + b λ (Zheng and Pang 2003, Eq. 6).
+struct Flexibility {
+  double a = 0.75;
+  double b = -0.001;  ///< 1/nm.
+
+  double at(double wavelength) const { return a + b * wavelength; }
+};
+
+/// A wavelength band, or a colour in RGB mode.
+struct LightChannel {
+  double flexibility = 0;
+  double wavelength = 0;  ///< nm; 0 in RGB mode.
+  double power = 1;       ///< Fraction of the beam's power.
+};
 
 enum class BendingMethod {
   automatic,  ///< `splitting4` in a cubic field; `splitting` in a linear one, whose kinks leave no more than order 2.
@@ -66,6 +82,9 @@ enum class RayEnd : std::uint8_t {
 constexpr int ray_end_count = 6;
 const char* to_string(RayEnd end);
 
+/// The number of rays of one channel that ended for each reason, indexed by RayEnd.
+using EndCounts = std::array<std::uint64_t, ray_end_count>;
+
 /// Derivatives of a ray along two parameters (Igehy 1999, "Tracing Ray Differentials"), one column for each parameter.
 struct RayDifferential {
   Eigen::Matrix<double, 3, 2> position = Eigen::Matrix<double, 3, 2>::Zero();   ///< World units per parameter.
@@ -99,6 +118,72 @@ struct RayBatch {
   std::size_t size() const { return position.size(); }
   void clear();
   void add(const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility);
+};
+
+/// A point of a path.
+struct PathPoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< V; unit.
+  double length = 0;                                    ///< Length of the path up to here, world units.
+  bool in_field = false;  ///< Whether the path bends here (inside the volume and the cut).
+
+  // Set by `set_tensors`; zero where light is straight.
+  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();  ///< T of the field here.
+  Eigen::Vector3d change = Eigen::Vector3d::Zero();  ///< V' here, with σ·T. Its norm is the curvature of the path.
+
+  Eigen::Vector3d force() const { return tensor * direction; }  ///< T V; its norm is Eq. 11.
+};
+using PathPoints = std::vector<PathPoint>;
+
+/// A ray after a step in the field, as the kernel has it, in single precision: most points are not needed, and
+/// converting them would take longer than tracing the ray. The kernel writes each four numbers as one vector.
+struct alignas(16) StepPoint {
+  float position[3];   ///< From the first voxel of a brick, in voxels.
+  float length;        ///< Length of the path since the ray entered the field, world units.
+  float direction[3];  ///< V; unit within rounding, world axes.
+  float padding;
+  std::int32_t brick[3];  ///< Coordinates of the brick, in bricks.
+  std::int32_t more_padding;
+
+  BrickPoint place() const { return {{brick[0], brick[1], brick[2]}, {position[0], position[1], position[2]}}; }
+};
+
+/// The step as a point of the path, without its tensor.
+/// @param entry_length  Length of the path where the ray entered the field.
+PathPoint path_point(const TensorField& field, const StepPoint& step, double entry_length);
+
+/// Points of a ray, from the start to the end. In the field there is one point for each step, from the entry to the
+/// exit. A straight piece that ends on a surface has a point at each end. Where the ray enters or leaves the field
+/// there are two points, one of them in the field. Empty if the ray meets nothing.
+struct RayRecord {
+  PathPoints before;             ///< The first points. If there are steps, the last one is the entry into the field.
+  std::vector<StepPoint> steps;  ///< The points after them: steps of packets.
+  PathPoints behind;             ///< The last points.
+
+  std::size_t size() const { return before.size() + steps.size() + behind.size(); }
+};
+
+/// Point i of the ray, without its tensor.
+PathPoint path_point(const TensorField& field, const RayRecord& record, std::size_t i);
+
+/// The side faces of a field's box for light of one direction: those whose outward normals are more across the light
+/// than along it. Light may be so oblique that these are all faces. Then they are those through which straight light
+/// does not leave the box.
+class SideFaces {
+ public:
+  /// @param field      Must outlive it.
+  /// @param direction  Of straight light; not zero.
+  SideFaces(const TensorField& field, const Eigen::Vector3d& direction);
+
+  /// Gives the end `side` to the rays of a traced batch that left the box through a side face, and then reached the
+  /// plate or missed it. Rays that end in the box, or have never been in it, keep their ends. Any thread may call it.
+  void mark(RayBatch& batch) const;
+
+ private:
+  bool left_through(const Eigen::Vector3d& position, const Eigen::Vector3d& direction) const;
+
+  const TensorField& field_;
+  std::array<bool, 6> is_side_{};  // The lower and the upper face of each axis of index space.
 };
 
 }  // namespace tensorray

@@ -46,7 +46,15 @@ struct Group {
 }  // namespace
 
 struct Geometry::State {
-  explicit State(Surfaces parts);
+  explicit State(Surfaces parts)
+      : surfaces(std::move(parts)),
+        receiver(receiver_mesh(surfaces)),
+        volume(surfaces.bounds.bounds()),
+        size(volume.diagonal().norm()),
+        margin(relative_margin * size),
+        bounds({{&surfaces.bounds, Surface::bounds}}, volume.center(), size),
+        cut(cut_parts(), volume.center(), size),
+        absorbers(absorber_parts(), volume.center(), size) {}
 
   Surfaces surfaces;
   TriangleMesh receiver;
@@ -55,51 +63,49 @@ struct Geometry::State {
   // The scenes' coordinates are relative to the volume, so that single precision resolves it well.
   Group bounds, cut, absorbers;
 
-  void require_within_reach(const TriangleMesh& mesh, const std::string& name) const;
-  std::vector<Part> cut_parts() const;
-  std::vector<Part> absorber_parts() const;
+  /// @throw std::invalid_argument if single precision does not reach the mesh.
+  Part part_of(const TriangleMesh& mesh, Surface surface, const std::string& name) const {
+    const double reach = TriangleScene::reach * size;
+    for (const Eigen::Vector3d& vertex : mesh.vertices)
+      if (!((vertex - volume.center()).array().abs() <= reach).all())
+        throw std::invalid_argument(name + " is more than 1e12 times the volume's size away from the volume, which " +
+                                    "is beyond single precision; move it nearer, or check its units");
+    return {&mesh, surface};
+  }
+
+  std::vector<Part> cut_parts() const {
+    if (!surfaces.cut) return {};
+    return {part_of(*surfaces.cut, Surface::cut, "the mesh that cuts the volume")};
+  }
+
+  std::vector<Part> absorber_parts() const {
+    std::vector<Part> parts;
+    if (!receiver.triangles.empty()) parts.push_back(part_of(receiver, Surface::plate, "the receiver"));
+    for (std::size_t i = 0; i < surfaces.obstacles.size(); ++i)
+      parts.push_back(part_of(surfaces.obstacles[i], Surface::obstacle, "obstacle " + std::to_string(i)));
+    return parts;
+  }
 
   /// The nearest hit of a group at more than `min_distance` (which may be negative).
   std::optional<Hit> nearest(const Group& group, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
-                             double min_distance, double max_distance) const;
+                             double min_distance, double max_distance) const {
+    const auto seen = group.scene.nearest(from, direction, min_distance, max_distance);
+    if (!seen) return std::nullopt;
+    const Part& part = group.parts[seen->mesh];
+    const auto& triangle = part.mesh->triangles[seen->triangle];
+    const Eigen::Vector3d& a = part.mesh->vertices[triangle[0]];
+    const Eigen::Vector3d& b = part.mesh->vertices[triangle[1]];
+    const Eigen::Vector3d& c = part.mesh->vertices[triangle[2]];
+    Hit hit;
+    hit.surface = part.surface;
+    hit.normal = (b - a).cross(c - a).normalized();
+    const double exact = hit.normal.dot(a - from) / hit.normal.dot(direction);
+    // Where a ray grazes a plane, the distance to the plane is ill-conditioned: keep the distance from Embree.
+    const double allowed = 10 * (margin + relative_margin * std::abs(seen->distance));
+    hit.distance = std::abs(exact - seen->distance) <= allowed ? exact : seen->distance;
+    return hit;
+  }
 };
-
-Geometry::State::State(Surfaces parts)
-    : surfaces(std::move(parts)),
-      receiver(receiver_mesh(surfaces)),
-      volume(surfaces.bounds.bounds()),
-      size(volume.diagonal().norm()),
-      margin(relative_margin * size),
-      bounds({{&surfaces.bounds, Surface::bounds}}, volume.center(), size),
-      cut(cut_parts(), volume.center(), size),
-      absorbers(absorber_parts(), volume.center(), size) {}
-
-void Geometry::State::require_within_reach(const TriangleMesh& mesh, const std::string& name) const {
-  const double reach = TriangleScene::reach * size;
-  for (const Eigen::Vector3d& vertex : mesh.vertices)
-    if (!((vertex - volume.center()).array().abs() <= reach).all())
-      throw std::invalid_argument(name + " is more than 1e12 times the volume's size away from the volume, which is " +
-                                  "beyond single precision; move it nearer, or check its units");
-}
-
-std::vector<Part> Geometry::State::cut_parts() const {
-  if (!surfaces.cut) return {};
-  require_within_reach(*surfaces.cut, "the mesh that cuts the volume");
-  return {{&*surfaces.cut, Surface::cut}};
-}
-
-std::vector<Part> Geometry::State::absorber_parts() const {
-  std::vector<Part> parts;
-  if (!receiver.triangles.empty()) {
-    require_within_reach(receiver, "the receiver");
-    parts.push_back({&receiver, Surface::plate});
-  }
-  for (std::size_t i = 0; i < surfaces.obstacles.size(); ++i) {
-    require_within_reach(surfaces.obstacles[i], "obstacle " + std::to_string(i));
-    parts.push_back({&surfaces.obstacles[i], Surface::obstacle});
-  }
-  return parts;
-}
 
 Geometry::Geometry(Surfaces surfaces) : state_(std::make_unique<State>(std::move(surfaces))) {}
 Geometry::~Geometry() = default;
@@ -109,26 +115,6 @@ Geometry& Geometry::operator=(Geometry&&) noexcept = default;
 double Geometry::margin() const { return state_->margin; }
 
 const Surfaces& Geometry::surfaces() const { return state_->surfaces; }
-
-std::optional<Hit> Geometry::State::nearest(const Group& group, const Eigen::Vector3d& from,
-                                            const Eigen::Vector3d& direction, double min_distance,
-                                            double max_distance) const {
-  const auto seen = group.scene.nearest(from, direction, min_distance, max_distance);
-  if (!seen) return std::nullopt;
-  const Part& part = group.parts[seen->mesh];
-  const auto& triangle = part.mesh->triangles[seen->triangle];
-  const Eigen::Vector3d& a = part.mesh->vertices[triangle[0]];
-  const Eigen::Vector3d& b = part.mesh->vertices[triangle[1]];
-  const Eigen::Vector3d& c = part.mesh->vertices[triangle[2]];
-  Hit hit;
-  hit.surface = part.surface;
-  hit.normal = (b - a).cross(c - a).normalized();
-  const double exact = hit.normal.dot(a - from) / hit.normal.dot(direction);
-  // Where a ray grazes a plane, the distance to the plane is ill-conditioned: keep the distance from Embree.
-  const double allowed = 10 * (margin + relative_margin * std::abs(seen->distance));
-  hit.distance = std::abs(exact - seen->distance) <= allowed ? exact : seen->distance;
-  return hit;
-}
 
 std::optional<Hit> Geometry::absorber(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                       double max_distance) const {

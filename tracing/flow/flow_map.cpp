@@ -1,16 +1,22 @@
 #include "tracing/flow/flow_map.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
 
+#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
 #include "base/geometry/box.h"
 #include "base/process/job.h"
-#include "tracing/flow/flow_vertices.h"
+#include "base/text/content_hash.h"
+#include "tracing/flow/flow_lattice.h"
+#include "tracing/flow/wavelength_tracer.h"
 
 namespace tensorray {
 namespace {
@@ -53,11 +59,206 @@ double first_size(const TensorField& field, const Beam& beam, double pixel, cons
   return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
 }
 
-Geometry extended(const Geometry& geometry) {
-  Surfaces surfaces = geometry.surfaces();
-  surfaces.plate->size *= 1 + 2 * margin;
-  return Geometry(std::move(surfaces));
+/// What the landings of a vertex depend on, beside the map's settings: where its light starts, and a hash of the
+/// landings of its parents.
+using VertexKey = std::array<std::uint64_t, 3>;
+
+std::uint64_t hash_of(const void* values, std::size_t size, std::uint64_t before) {
+  return content_hash({static_cast<const char*>(values), size}, before);
 }
+
+/// What the landings of a vertex at the start of a map depend on beside its place.
+std::uint64_t hash_of_map(const Beam& beam, const FlowSettings& settings) {
+  std::uint64_t hash = 0;
+  const auto add = [&](const auto& values) { hash = hash_of(values.data(), values.size() * sizeof values[0], hash); };
+  const Plate& plate = *settings.plate;
+  add(std::array<double, 4>{settings.tolerance, static_cast<double>(settings.range), plate.size.x(), plate.size.y()});
+  add(settings.flexibilities);
+  add(plate.resolution);
+  for (const Eigen::Vector3d& each :
+       {plate.center, plate.right, plate.up, beam.center, beam.direction, beam.right, beam.up})
+    add(each);
+  return hash;
+}
+
+/// Adds vertices at points of a lattice, and traces their light: on all threads, with the ranks of the settings' job,
+/// and only where it is not among the landings that the job keeps. Not to be used by two threads at once.
+class FlowVertices {
+ public:
+  /// @param settings  With a plate. All arguments must outlive it.
+  FlowVertices(const TensorField& field, const Geometry& geometry, const Beam& beam, const BendingSettings& bending,
+               const FlowSettings& settings, const Progress& progress)
+      : beam_(beam), settings_(settings), progress_(progress), tracer_(field, geometry, beam, bending, settings) {
+    map_.wavelengths = tracer_.wavelengths();
+    map_.check_step = tracer_.check_step();
+    if (settings.job && settings.is_kept) find_kept();
+  }
+
+  /// The index of the vertex at a point of the finest lattice, which is added if it is not there.
+  std::uint32_t at(std::uint32_t patch, std::uint32_t x, std::uint32_t y, const Parents& parents = {}) {
+    const auto [found, is_new] =
+        lattice.vertices.emplace(FlowLattice::key(patch, x, y), static_cast<std::uint32_t>(map_.starts.size()));
+    if (is_new) {
+      const Patch& p = lattice.patches[patch];
+      const double u = lattice.u_of(patch, x), v = lattice.v_of(patch, y);
+      map_.starts.push_back(p.at(u, v));
+      const double least = settings_.silhouette ? inset : 0;
+      starts_.push_back({p.at(std::clamp(u, least, 1 - least), std::clamp(v, least, 1 - least)), parents});
+    }
+    return found->second;
+  }
+
+  /// Traces the light of those that were added; their parents must have been traced before. @throw Cancelled; as
+  /// Ranks::all_gather; DamagedArchive.
+  void trace_new() {
+    const std::size_t count = map_.starts.size(), first = traced_;
+    map_.landings.resize(count * map_.wavelengths);
+    map_.ends.resize(count * map_.wavelengths);
+    map_.lengths.resize(count * map_.checks());
+    const auto begin_of = [&](std::size_t task) { return std::min(first + task * task_size, count); };
+    Units tasks;
+    tasks.count = (count - first + task_size - 1) / task_size;
+    tasks.for_all = true;
+    tasks.round = round_tasks;
+    tasks.make = [&](std::size_t task) { trace_vertices(begin_of(task), begin_of(task + 1)); };
+    tasks.copy = [&](std::size_t task, Archive& archive) {
+      copy_landings(begin_of(task), begin_of(task + 1), archive);
+    };
+    tasks.first = first / task_size;
+    tasks.total = settings_.max_starts / task_size + 1;
+    make_units(tasks, settings_.job, "tracing rays", progress_);
+    traced_ = count;
+  }
+
+  /// Keeps the landings of all, if the map is kept, and is that of a shard or took long.
+  void keep() {
+    if (!settings_.job || !settings_.is_kept || !is_root(settings_.job->ranks)) return;
+    if (!settings_.job->is_shard && !settings_.job->is_long()) return;
+    Archive archive;
+    for (std::size_t i = 0; i < traced_; ++i) {
+      VertexKey key = key_of(i);
+      archive.copy(key);
+      copy_landings(i, i + 1, archive);
+    }
+    settings_.job->keep(name_of(settings_.job->part().index), archive.take());
+  }
+
+  const FlowMap& map() const { return map_; }  ///< Without triangles and edges.
+
+  /// The map, with the numbers of rays.
+  FlowMap take() {
+    map_.rays = tracer_.rays();
+    map_.ray_steps = tracer_.ray_steps();
+    map_.tensor_samples = tracer_.tensor_samples();
+    return std::move(map_);
+  }
+
+  FlowLattice lattice;
+
+ private:
+  static constexpr std::size_t task_size = 64;      // Vertices that one thread traces as one task.
+  static constexpr std::size_t round_tasks = 4096;  // Whose landings ranks give each other at once (100 MB).
+  // Rays from the aperture's edge start this part of a patch further inside: at the edge, rounding decides whether they
+  // enter the volume.
+  static constexpr double inset = 3e-6;
+
+  /// Where light of a vertex starts.
+  struct Start {
+    Eigen::Vector2d origin;  // Of its rays, in the beam's frame.
+    Parents parents;
+  };
+
+  struct KeyHash {
+    std::size_t operator()(const VertexKey& key) const { return hash_of(&key, sizeof key, 0); }
+  };
+
+  void trace_vertices(std::size_t begin, std::size_t end) {
+    std::vector<NewVertex> vertices;
+    for (std::size_t i = begin; i < end; ++i)
+      if (!restore(i)) vertices.push_back({i, beam_.start(starts_[i].origin), starts_[i].parents});
+    tracer_.trace(map_, vertices);
+  }
+
+  /// Copies the landings of vertices to or from bytes. @throw DamagedArchive if they cannot be those of light.
+  void copy_landings(std::size_t begin, std::size_t end, Archive& archive) {
+    const auto copy = [&](auto& values, std::size_t of_each) {
+      archive.copy(values.data() + begin * of_each, (end - begin) * of_each * sizeof values[0]);
+    };
+    copy(map_.landings, map_.wavelengths);
+    copy(map_.ends, map_.wavelengths);
+    copy(map_.lengths, map_.checks());
+    if (!archive.reads()) return;
+    for (std::size_t i = begin * map_.wavelengths; i < end * map_.wavelengths; ++i)
+      if (static_cast<std::size_t>(map_.ends[i]) >= ray_end_count ||
+          (map_.ends[i] == RayEnd::plate && !map_.landings[i].allFinite()))
+        throw DamagedArchive();
+  }
+
+  std::uint64_t hash_of_landings(std::size_t vertex) const {
+    std::uint64_t hash = 0;
+    const auto add = [&](const auto& values, std::size_t of_each) {
+      hash = hash_of(&values[vertex * of_each], of_each * sizeof values[0], hash);
+    };
+    add(map_.landings, map_.wavelengths);
+    add(map_.ends, map_.wavelengths);
+    add(map_.lengths, map_.checks());
+    return hash;
+  }
+
+  VertexKey key_of(std::size_t vertex) const {
+    const auto& [origin, parents] = starts_[vertex];
+    VertexKey key{};
+    std::memcpy(key.data(), origin.data(), 2 * sizeof key[0]);
+    // In their order: lengths are sums in this order. A vertex between the parts of two shards has the parents of
+    // either quad, and each shard keeps it in its own way.
+    for (std::size_t i = 0; i < parents.count; ++i) {
+      const std::uint64_t hash = hash_of_landings(parents.vertices[i]);
+      key[2] = hash_of(&hash, sizeof hash, key[2]);
+    }
+    return key;
+  }
+
+  std::string name_of(std::size_t part) const {
+    return fmt::format("flow map {:016x} {}", hash_of_map(beam_, settings_), part);
+  }
+
+  /// Finds the landings that earlier runs have kept of this map.
+  void find_kept() {
+    const std::size_t bytes = map_.wavelengths * (sizeof map_.landings[0] + sizeof map_.ends[0]) +
+                              map_.checks() * sizeof map_.lengths[0];  // Of one vertex.
+    for (std::size_t part = 0; part < settings_.job->part().count; ++part) {
+      const Result found = settings_.job->find(name_of(part));
+      if (!found) continue;
+      if (found->size() % (sizeof(VertexKey) + bytes) != 0) throw DamagedArchive();
+      found_.push_back(found);
+      for (std::string_view rest = *found; !rest.empty(); rest.remove_prefix(sizeof(VertexKey) + bytes)) {
+        VertexKey key;
+        std::memcpy(key.data(), rest.data(), sizeof key);
+        kept_.emplace(key, rest.substr(sizeof key, bytes));
+      }
+    }
+  }
+
+  /// Takes the landings of a vertex from those that were kept. @return whether they are there.
+  bool restore(std::size_t vertex) {
+    if (kept_.empty()) return false;
+    const auto found = kept_.find(key_of(vertex));
+    if (found == kept_.end()) return false;
+    Archive archive(found->second);
+    copy_landings(vertex, vertex + 1, archive);
+    return true;
+  }
+
+  const Beam& beam_;
+  const FlowSettings& settings_;
+  const Progress& progress_;
+  WavelengthTracer tracer_;
+  FlowMap map_;
+  std::vector<Start> starts_;
+  std::size_t traced_ = 0;                                         // Number of vertices that have landings.
+  std::vector<Result> found_;                                      // What the job has kept of this map.
+  std::unordered_map<VertexKey, std::string_view, KeyHash> kept_;  // Landings in it.
+};
 
 class FlowMapBuilder {
  public:
@@ -173,7 +374,7 @@ class FlowMapBuilder {
     bool is_seen = false;
     float width = std::numeric_limits<float>::infinity(), extent = 0;
     Eigen::Vector2f first(0, 0), last(0, 0);
-    for (const std::size_t sample : vertices_.check_samples()) {
+    for (std::size_t sample = 0; sample < map().wavelengths; sample += map().check_step) {
       const Reach reach = reach_of(quad.corners, sample);
       if (!is_on_plate(reach)) continue;
       if (reach.landed < 4) return true;
@@ -293,7 +494,7 @@ class FlowMapBuilder {
     const auto& [a, b, c, d] = quad.corners;
     const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
     float greatest = 0;
-    for (const std::size_t sample : vertices_.check_samples())
+    for (std::size_t sample = 0; sample < map().wavelengths; sample += map().check_step)
       if (is_on_plate(reach_of(all, sample))) greatest = std::max(greatest, deviation_at(quad, middles, sample));
     return greatest;
   }
@@ -331,10 +532,12 @@ int band_count(const FlowMap& map, int channels, const BandStep& step) {
 FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Beam& beam,
                        const BendingSettings& bending, const FlowSettings& settings, const Progress& progress) {
   if (!settings.plate) {
-    if (!geometry.surfaces().plate) throw std::invalid_argument("a flow map needs a receiver");
+    Surfaces extended = geometry.surfaces();
+    if (!extended.plate) throw std::invalid_argument("a flow map needs a receiver");
     FlowSettings with_plate = settings;
-    with_plate.plate = geometry.surfaces().plate;
-    return trace_flow_map(field, extended(geometry), beam, bending, with_plate, progress);
+    with_plate.plate = extended.plate;
+    extended.plate->size *= 1 + 2 * margin;
+    return trace_flow_map(field, Geometry(std::move(extended)), beam, bending, with_plate, progress);
   }
   if (settings.flexibilities.empty() || (settings.range && settings.flexibilities.size() != 2))
     throw std::invalid_argument("a flow map needs flexibilities, and a range has two");

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <tbb/concurrent_unordered_map.h>
 
+#include "base/text/content_hash.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
 
@@ -28,8 +29,6 @@ class RayMemory {
   void trace(const TensorField& field, const Geometry& volume, const Geometry& geometry,
              const BendingSettings& settings, RayBatch& batch);
 
-  std::size_t size() const { return exits_.size(); }
-
  private:
   /// A ray that left the volume, or ended in it.
   struct Exit {
@@ -38,17 +37,13 @@ class RayMemory {
     RayEnd end;
   };
   using Key = std::array<double, 4>;  // Start and flexibility.
-
   struct Hash {
-    std::size_t operator()(const Key& key) const;
+    std::size_t operator()(const Key& key) const {
+      return content_hash({reinterpret_cast<const char*>(key.data()), sizeof key});
+    }
   };
-
-  static Key key_of(const RayBatch& batch, std::size_t ray);
 
   tbb::concurrent_unordered_map<Key, Exit, Hash> exits_;
 };
-
-/// `geometry` without its plate.
-Geometry without_plate(const Geometry& geometry);
 
 }  // namespace tensorray

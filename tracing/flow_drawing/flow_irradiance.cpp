@@ -134,23 +134,12 @@ std::vector<float> sheets_of(const FlowMap& map, const Eigen::Vector2i& resoluti
     view.draw(tile, 1, 0, place, {}, points);
     const Eigen::AlignedBox2i box = view.pixels(tile);
     auto point = points.begin();
-    for (int y = box.min().y(); y <= box.max().y(); ++y)
-      for (int x = box.min().x(); x <= box.max().x(); ++x, ++point)
-        sheets[static_cast<std::size_t>(y) * static_cast<std::size_t>(resolution.x()) + static_cast<std::size_t>(x)] =
-            point->sheets;
+    for (int y = box.min().y(); y <= box.max().y(); ++y) {
+      float* const row = &sheets[static_cast<std::size_t>(y) * static_cast<std::size_t>(resolution.x())];
+      for (int x = box.min().x(); x <= box.max().x(); ++x) row[x] = (point++)->sheets;
+    }
   });
   return sheets;
-}
-
-/// Copies the light of a direction to or from bytes.
-/// @param folds  Of the first direction; else null.
-void copy_light(Archive& archive, const Eigen::Vector2i& resolution, std::size_t channels, Film& irradiance,
-                std::vector<float>* folds) {
-  if (archive.reads()) irradiance = Film(resolution.x(), resolution.y(), static_cast<int>(channels));
-  archive.copy(irradiance.values.data(), irradiance.values.size() * sizeof irradiance.values[0]);
-  if (!folds) return;
-  folds->resize(irradiance.plane_size());
-  archive.copy(folds->data(), folds->size() * sizeof(float));
 }
 
 }  // namespace
@@ -187,7 +176,12 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
     };
     const std::string name = fmt::format("{}map {} {}", light_name, settings.number, pass);
     find_or_make(settings.job, name, make, [&](Archive& archive) {
-      copy_light(archive, result.plate.resolution, channels, irradiance, pass == 0 ? &result.folds : nullptr);
+      const Eigen::Vector2i& resolution = result.plate.resolution;
+      if (archive.reads()) irradiance = Film(resolution.x(), resolution.y(), static_cast<int>(channels));
+      archive.copy(irradiance.values.data(), irradiance.values.size() * sizeof irradiance.values[0]);
+      if (pass > 0) return;
+      result.folds.resize(irradiance.plane_size());
+      archive.copy(result.folds.data(), result.folds.size() * sizeof(float));
     });
     if (pass == 0) {
       result.irradiance = std::move(irradiance);

@@ -44,8 +44,7 @@ struct FlowIrradiance {
 /// Traces the flow map of the light that enters the volume to the plane of `plate`, or to the body of `surfaces`.
 /// Surfaces of `surfaces` (bounds, cut, obstacles; its plate is ignored) stop light.
 /// @param plate  The whole surface. For a body, a plane behind all of it that faces the light: the points of the body
-/// are
-///               projected on it, from the source if there is one.
+///               are projected on it, from the source if there is one.
 /// @return nothing if no light lands, or if the light meets the plane before the volume. The same for any number of
 /// threads, and at all ranks of any number. @throw Cancelled; as Ranks::all_gather.
 std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Surfaces& surfaces, const Plate& plate,

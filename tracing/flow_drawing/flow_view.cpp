@@ -71,13 +71,13 @@ bool has_samples(const Eigen::AlignedBox2d& box, int n) {
 /// The sides of a triangle of either orientation; side i is opposite corner i.
 struct Sides {
   std::array<Side, 3> sides;
-  double sign, area;  // Orientation, and twice the area.
+  double area;  // Twice.
 
   explicit Sides(const std::array<Corner, 3>& c)
       : sides{Side(c[1], c[2]), Side(c[2], c[0]), Side(c[0], c[1])},
-        sign(cross(c[1].sample - c[0].sample, c[2].sample - c[0].sample) < 0 ? -1 : 1),
-        area(std::abs(cross(c[1].sample - c[0].sample, c[2].sample - c[0].sample))) {
-    if (sign < 0) sides = {Side(c[2], c[1]), Side(c[0], c[2]), Side(c[1], c[0])};
+        area(cross(c[1].sample - c[0].sample, c[2].sample - c[0].sample)) {
+    if (area < 0) sides = {Side(c[2], c[1]), Side(c[0], c[2]), Side(c[1], c[0])};
+    area = std::abs(area);
   }
 
   /// Narrows the points of a row that the triangle may contain: from (first, y) to (last, y).

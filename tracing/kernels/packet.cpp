@@ -20,20 +20,14 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
   // No voxel is longer along any direction. (The norm is not less than the greatest singular value.)
   const float longest_voxel = static_cast<float>(to_world.norm());
   longest_kick = longest_step * static_cast<float>(method.longest_kick) * longest_voxel;
+  constexpr double cells = TensorBrick::cells, most = 1e8;
+  const double margin_of_steps = std::min(longest_step + 1.0, 1e9);  // A step may begin a little outside its brick.
   for (int axis = 0; axis < 3; ++axis) {
     for (int column = 0; column < 3; ++column) to_index[axis][column] = static_cast<float>(M(axis, column));
     first[axis] = static_cast<std::int32_t>(field.voxels().min()[axis]);
     last[axis] = static_cast<std::int32_t>(field.voxels().max()[axis]);
     slope[axis] = field.voxels().sizes()[axis] > 0 ? 1.0f : 0.0f;
     margin[axis] = static_cast<float>(field.index_bounds().max()[axis] - field.voxels().max()[axis]);
-  }
-  find_bricks_near_surfaces();
-}
-
-void PacketMedium::find_bricks_near_surfaces() {
-  constexpr double cells = TensorBrick::cells, most = 1e8;
-  const double margin_of_steps = std::min(longest_step + 1.0, 1e9);  // A step may begin a little outside its brick.
-  for (int axis = 0; axis < 3; ++axis) {
     first_near[axis] = 1;
     last_near[axis] = 0;
     if (!settings.geometry) continue;

@@ -40,9 +40,6 @@ struct PacketMedium {
     for (int axis = 0; axis < 3; ++axis) near &= at[axis] >= first_near[axis] && at[axis] <= last_near[axis];
     return near;
   }
-
- private:
-  void find_bricks_near_surfaces();
 };
 
 /// From this ‖σ h T‖ on, the norm of a kick is computed; below, its bound in the brick is used.

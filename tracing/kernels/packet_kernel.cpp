@@ -277,11 +277,6 @@ class Kernel {
     aim_along_path(medium_, packet, landing);
     take_step<components, differentials>(medium_, packet);
     move_to_faces(medium_, packet, landing);
-    arrive(packet, landing);
-  }
-
-  /// Writes back the rays, which are on the extent's faces.
-  void arrive(Packet& packet, const FaceLanding& landing) {
     for_lanes(packet.alive, [&](int lane) {
       KernelRay& ray = rays_[packet.ray[lane]];
       for (int axis = 0; axis < 3; ++axis) {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "tracing/bending/geometry.h"
-#include "tracing/bending/ray_record.h"
+#include "tracing/bending/bending.h"
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray::packets {

@@ -54,8 +54,6 @@ Clamped clamped(const Basis& axes, const Eigen::Vector3d& V, const CrossSectionS
   return result;
 }
 
-bool round(const Clamped& e) { return e.major_length - e.minor_length <= negligible * e.major_length; }
-
 void check(const CrossSectionSettings& settings) {
   if (!(settings.scale > 0)) throw std::invalid_argument("the scale of cross sections must be positive");
   if (!(settings.min_radius > 0)) throw std::invalid_argument("the least radius of cross sections must be positive");
@@ -118,7 +116,7 @@ std::vector<CrossSection> cross_sections(const PathPoints& points, const CrossSe
       frame = carry(frame);
       axis = carry(axis);
     }
-    if (round(e)) e.major = axis;
+    if (e.major_length - e.minor_length <= negligible * e.major_length) e.major = axis;  // A circle.
     if (e.major.dot(axis) < 0) e.major = -e.major;
     e.minor = V.cross(e.major);
     axis = e.major;

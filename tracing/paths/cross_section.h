@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "tracing/bending/ray_record.h"
+#include "tracing/bending/bending.h"
 
 namespace tensorray {
 

@@ -38,8 +38,7 @@ struct PathInterpolation {
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace tensorray {
-namespace HWY_NAMESPACE {
+namespace tensorray::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
@@ -126,8 +125,7 @@ void set_squares(const float* tensors, std::size_t room, float* squares) {
 }
 
 }  // namespace
-}  // namespace HWY_NAMESPACE
-}  // namespace tensorray
+}  // namespace tensorray::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
@@ -136,14 +134,9 @@ namespace tensorray {
 HWY_EXPORT(max_missed);
 HWY_EXPORT(set_squares);
 
-namespace {
-
-/// The factor that makes the square of an allowed error 1.
-float factor(double allowed) { return std::min(static_cast<float>(1 / (allowed * allowed)), 1e30f); }
-
-}  // namespace
-
 std::vector<std::size_t> thinned(const PathSamples& samples, double tolerance, double tensor_tolerance) {
+  // The factor that makes the square of an allowed error 1.
+  const auto factor = [](double allowed) { return std::min(static_cast<float>(1 / (allowed * allowed)), 1e30f); };
   PathInterpolation path{};
   std::vector<float> squares;
   path.positions = samples.positions.data();

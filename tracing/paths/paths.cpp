@@ -7,7 +7,6 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include "base/process/job.h"
-#include "tracing/paths/joined_ray.h"
 #include "tracing/paths/path_thinning.h"
 #include "tracing/steps/scalar_tracer.h"
 #include "tracing/trace/trace.h"
@@ -98,14 +97,6 @@ void trace_batch(const PathJob& job, const PathSeed* seeds, std::size_t count, P
   }
 }
 
-void copy_path(Path& path, Archive& archive) {
-  archive.copy_list(path.points);
-  archive.copy(path.flexibility);
-  archive.copy(path.wavelength);
-  archive.copy(path.end);
-  archive.copy(path.backward_end);
-}
-
 }  // namespace
 
 std::vector<Path> trace_paths(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
@@ -129,7 +120,13 @@ std::vector<Path> trace_paths(const TensorField& field, const Geometry& geometry
     trace_batch(job, &seeds[begin], end_of(batch) - begin, workers.local(), &paths[begin]);
   };
   batches.copy = [&](std::size_t batch, Archive& archive) {
-    for (std::size_t i = begin_of(batch); i < end_of(batch); ++i) copy_path(paths[i], archive);
+    for (std::size_t i = begin_of(batch); i < end_of(batch); ++i) {
+      archive.copy_list(paths[i].points);
+      archive.copy(paths[i].flexibility);
+      archive.copy(paths[i].wavelength);
+      archive.copy(paths[i].end);
+      archive.copy(paths[i].backward_end);
+    }
   };
   make_units(batches, settings.job, "tracing paths", progress);
   return paths;

@@ -9,7 +9,6 @@
 #include "base/process/progress.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
-#include "tracing/bending/ray_record.h"
 
 namespace tensorray {
 
@@ -33,9 +32,8 @@ struct PathSettings {
   bool tensors = true;
 
   /// Points are left out where linear interpolation between the remaining points errs by no more than both tolerances.
-  double tolerance = 0.05;  ///< In position, in voxels; >= 0.
-  double tensor_tolerance =
-      0.02;  ///< In T, as a fraction of the greatest norm of T there; >= 0. Unused without tensors.
+  double tolerance = 0.05;         ///< In position, in voxels; >= 0.
+  double tensor_tolerance = 0.02;  ///< In T, a part of its greatest norm there; >= 0. Unused without tensors.
 
   Job* job = nullptr;  ///< Whose ranks trace the paths together, and all have them; null: alone.
 };

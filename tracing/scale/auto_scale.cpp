@@ -45,13 +45,10 @@ ProbeBeam probe_beam(const TensorField& field, const Beam& beam) {
   Emission emission;
   for (std::uint64_t i = 0; i < sampler.candidates(); ++i)
     if (sampler.sample(i, emission)) probes.origins.push_back(emission.origin);
-  double near = 0, far = 0;
-  bool is_first = true;
+  double near = Geometry::infinite, far = -near;
   for (const Vector3d& corner : field.corners()) {
-    const double place = corner.dot(beam.direction);
-    near = is_first ? place : std::min(near, place);
-    far = is_first ? place : std::max(far, place);
-    is_first = false;
+    near = std::min(near, corner.dot(beam.direction));
+    far = std::max(far, corner.dot(beam.direction));
   }
   probes.plane = far + plane_distance * (far - near);
   return probes;

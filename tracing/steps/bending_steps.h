@@ -20,8 +20,7 @@ namespace tensorray::bending_steps {
 template <int N>
 struct State {
   Eigen::Matrix<double, 3, N> P, V;
-  double log_radiance_scale =
-      0;  ///< Λ of the ray: see RayBatch. Not computed by `splitting` and `splitting4` with N = 3.
+  double log_radiance_scale = 0;  ///< Λ: see RayBatch. Not computed by `splitting` and `splitting4` with N = 3.
 
   auto position() const { return P.template leftCols<1>(); }
   auto direction() const { return V.template leftCols<1>(); }

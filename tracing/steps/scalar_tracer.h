@@ -7,11 +7,9 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
-#include "tracing/bending/ray_record.h"
 #include "tracing/steps/bending_steps.h"
 #include "volumes/sampling/tensor_sampler.h"
 

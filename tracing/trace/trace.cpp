@@ -166,12 +166,6 @@ void approach(const TensorField& field, const BendingSettings& settings, RayBatc
   }
 }
 
-/// Says where the kernel records the steps of its rays.
-void record_steps(RayRecord* records, TracedBatch& traced) {
-  if (!records) return;
-  for (const std::size_t number : traced.numbers) traced.kernel.points.push_back(&records[number].steps);
-}
-
 /// Follows ray i of the kernel from the point where the kernel stopped to its end.
 template <int N>
 RayEnd finish(const TensorField& field, const TracedBatch& traced, std::size_t i, double strength, RayRecord* records,
@@ -200,7 +194,8 @@ void trace_in_packets(const TensorField& field, const Geometry& geometry, const 
                       RayBatch& batch, RayRecord* records, Tracer<N>& tracer) {
   TracedBatch traced;
   approach(field, settings, batch, records, tracer, traced);
-  record_steps(records, traced);
+  if (records)
+    for (const std::size_t number : traced.numbers) traced.kernel.points.push_back(&records[number].steps);
   batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), traced.kernel);
   for (std::size_t i = 0; i < traced.numbers.size(); ++i) {
     const std::size_t number = traced.numbers[i];
@@ -272,7 +267,11 @@ void trace(const TensorField& field, const Geometry& geometry, const BendingSett
            std::vector<RayRecord>* records) {
   if (records) {
     records->resize(batch.size());
-    for (RayRecord& record : *records) record.clear();
+    for (RayRecord& record : *records) {
+      record.before.clear();
+      record.steps.clear();
+      record.behind.clear();
+    }
   }
   trace_batch(field, geometry, settings, batch, records ? records->data() : nullptr, true);
 }

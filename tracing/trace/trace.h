@@ -6,7 +6,6 @@
 
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
-#include "tracing/bending/ray_record.h"
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {

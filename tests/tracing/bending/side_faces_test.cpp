@@ -1,4 +1,4 @@
-#include "tracing/bending/side_faces.h"
+#include "tracing/bending/bending.h"
 
 #include <vector>
 

@@ -1,6 +1,6 @@
 // Landings at the samples that are not traced.
 
-#include "tracing/flow/wavelength_prediction.h"
+#include "tracing/flow/wavelength_tracer.h"
 
 #include <cmath>
 #include <functional>

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "tests/tracing/packet_support.h"
-#include "tracing/paths/joined_ray.h"
 #include "tracing/trace/trace.h"
 #include "volumes/sampling/tensor_sampler.h"
 
