@@ -2,7 +2,6 @@
 /// Seconds from a page's message with a changed scale to a picture's bytes, without the network: the first, coarse
 /// picture and the finished one.
 
-#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <filesystem>
@@ -18,8 +17,6 @@
 
 namespace tensorray::bench {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// A page that waits for the answers to its scenes.
 class TimedPage {

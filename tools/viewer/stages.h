@@ -1,9 +1,10 @@
 #pragma once
 /// @file tools/viewer/stages.h
-/// The pictures that a page gets of one scene: coarse ones first.
+/// What a page may ask for, and the pictures that it gets of one scene: coarse ones first.
 
 #include <deque>
 #include <filesystem>
+#include <set>
 #include <vector>
 
 #include <Eigen/Core>
@@ -11,6 +12,22 @@
 #include "scenes/description/description.h"
 
 namespace tensorray {
+
+/// The files that a page may name in a scene: those of the scene that the server was started with.
+class AllowedFiles {
+ public:
+  explicit AllowedFiles(const SceneDescription& scene);
+
+  /// @throw SceneError naming the key of a file that is not among them.
+  void require(const SceneDescription& scene) const;
+
+ private:
+  std::set<std::filesystem::path> files_;
+};
+
+/// @throw SceneError naming the key, if the picture, the number of rays or a generated field is so large that it would
+/// keep the server busy for long, or fill its memory.
+void require_moderate(const SceneDescription& scene);
 
 /// How one picture of a scene is made.
 struct Stage {
