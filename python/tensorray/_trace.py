@@ -87,8 +87,9 @@ def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLik
         plate = _tensorray.Plate(*(np.asarray(part, float).ravel() for part in
                                    (plate.center, plate.normal, plate.up, plate.size)))
     request = _tensorray.TraceRequest(
-        starts, headings, flexibilities, along, turning, plate, eigenvalues, interpolation, border, float(smooth), method,
-        float(scale), float(step or 0), int(max_steps), math.inf if max_length is None else float(max_length), ways)
+        starts, headings, flexibilities, along, turning, plate, eigenvalues, interpolation, border, float(smooth),
+        method, float(scale), float(step or 0), int(max_steps),
+        math.inf if max_length is None else float(max_length), ways)
     with shown(progress) as report:
         return Trace(**_tensorray.trace(module_field("trace", field), request, threads, report), along=along)
 
