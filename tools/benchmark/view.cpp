@@ -5,7 +5,6 @@
 #include <condition_variable>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 #include <mutex>
 #include <string>
 

@@ -46,14 +46,16 @@ Json& section(Json& json, const char* key) {
 
 }  // namespace
 
-AllowedFiles::AllowedFiles(const SceneDescription& scene) {
+std::set<std::filesystem::path> resolved_files(const SceneDescription& scene) {
+  std::set<std::filesystem::path> files;
   for (const NamedFile& file : input_files(scene))
-    if (!file.path.empty()) files_.insert(resolved(file.path));
+    if (!file.path.empty()) files.insert(resolved(file.path));
+  return files;
 }
 
-void AllowedFiles::require(const SceneDescription& scene) const {
+void require_files(const SceneDescription& scene, const std::set<std::filesystem::path>& allowed) {
   for (const NamedFile& file : input_files(scene))
-    if (!file.path.empty() && files_.count(resolved(file.path)) == 0)
+    if (!file.path.empty() && allowed.count(resolved(file.path)) == 0)
       throw SceneError(printable(
           fmt::format("{}: {} is not a file of the scene that this view was started with; a page may use no other",
                       file.name, file.path.string())));

@@ -13,17 +13,11 @@
 
 namespace tensorray {
 
-/// The files that a page may name in a scene: those of the scene that the server was started with.
-class AllowedFiles {
- public:
-  explicit AllowedFiles(const SceneDescription& scene);
+/// The files that a scene names, without symbolic links.
+std::set<std::filesystem::path> resolved_files(const SceneDescription& scene);
 
-  /// @throw SceneError naming the key of a file that is not among them.
-  void require(const SceneDescription& scene) const;
-
- private:
-  std::set<std::filesystem::path> files_;
-};
+/// @throw SceneError naming the key of a file that is not among those of the scene that the server was started with.
+void require_files(const SceneDescription& scene, const std::set<std::filesystem::path>& allowed);
 
 /// @throw SceneError naming the key, if the picture, the number of rays or a generated field is so large that it would
 /// keep the server busy for long, or fill its memory.
@@ -36,6 +30,7 @@ struct Stage {
   bool all_outputs = false;  ///< Whether the picture comes with all that a page can ask of it.
   bool is_known = false;     ///< Whether the page has this picture already.
 
+  bool is_first() const { return coarseness > 1 && samples == 1; }
   bool is_final() const { return coarseness == 1 && samples == 0; }
 };
 
