@@ -4,7 +4,6 @@
 
 #include "python/module/module.h"
 
-#include <filesystem>
 #include <new>
 #include <stdexcept>
 #include <string>

@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <map>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -33,8 +31,6 @@ struct Rendered {
   std::string statistics;    ///< JSON.
   std::optional<int> frame;  ///< Of a scene with keyframes.
 };
-
-int threads_of(int threads) { return threads > 0 ? threads : static_cast<int>(usable_processors()); }
 
 OutputFiles open_requested(const RequestedScene& requested) {
   OutputDescription written = requested.description.output;
@@ -74,7 +70,8 @@ std::shared_ptr<Rendered> render_request(const SceneRequest& request, const std:
   const auto start = Clock::now();
   write_outputs(result, scene, files);
   Image display = display_image(scene, result, true);
-  std::string statistics = statistics_json(scene, result.statistics, seconds_since(start), threads_of(threads));
+  const int used = threads > 0 ? threads : static_cast<int>(usable_processors());
+  std::string statistics = statistics_json(scene, result.statistics, seconds_since(start), used);
   auto rendered = std::make_shared<Rendered>(
       Rendered{std::move(scene), std::move(result), std::move(display), std::move(statistics), request.frame});
   commit_outputs(std::move(files));

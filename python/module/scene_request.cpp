@@ -78,14 +78,8 @@ Scene load_request(const SceneRequest& request, const RequestedScene& scene, con
 
 void add_scene_request(pybind11::module_& module) {
   pybind11::class_<SceneRequest>(module, "SceneRequest")
-      .def(pybind11::init<>())
-      .def_readwrite("file", &SceneRequest::file)
-      .def_readwrite("json", &SceneRequest::json)
-      .def_readwrite("changes", &SceneRequest::changes)
-      .def_readwrite("frame", &SceneRequest::frame)
-      .def_readwrite("field", &SceneRequest::field)
-      .def_readwrite("outputs", &SceneRequest::outputs)
-      .def_readwrite("keep", &SceneRequest::keep);
+      .def(pybind11::init<std::filesystem::path, std::string, std::vector<std::string>, std::optional<int>,
+                          std::shared_ptr<Field>, std::vector<std::filesystem::path>, std::vector<std::string>>());
 }
 
 }  // namespace tensorray

@@ -26,15 +26,18 @@
 namespace tensorray {
 namespace {
 
-/// What `trace` needs beside the field; Python fills it.
+/// What `trace` needs beside the field; Python makes it.
 struct TraceRequest {
   Doubles positions, directions, flexibilities;  ///< (n, 3), (n, 3) unit, (n).
   std::optional<Doubles> along, turning;         ///< (n, 3, 2): derivatives of the starts.
   std::optional<Plate> plate;
-  std::string eigenvalues = "auto", method = "auto", interpolation = "cubic", border = "fade";
-  double smooth = 0;  ///< Voxels.
-  BendingSettings bending;
-  bool paths = false;
+  std::string eigenvalues, interpolation, border;
+  double smooth;  ///< Voxels.
+  std::string method;
+  double scale, step;
+  int max_steps;
+  double max_length;
+  bool paths;
 };
 
 /// Some of the rays, which one thread traces.
@@ -143,8 +146,12 @@ py::dict arrays_of(std::vector<TracedBatch> batches, py::ssize_t count) {
 py::dict trace_for_python(const Field& field, const TraceRequest& request, int threads, const py::object& report) {
   check(request);
   std::vector<TracedBatch> batches = batches_of(request);
-  BendingSettings bending = request.bending;
+  BendingSettings bending;
   bending.method = value_of<BendingMethod>("method", request.method);
+  bending.scale = request.scale;
+  bending.step = request.step;
+  bending.max_steps = request.max_steps;
+  bending.max_length = request.max_length;
   const bool extends = value_of<BorderChoice>("border", request.border) == BorderChoice::extend;
   const FieldChoices choices{
       request.smooth,
@@ -246,23 +253,8 @@ py::dict landings(const SceneRequest& request, std::vector<double> flexibilities
 void add_traces(py::module_& module) {
   py::class_<Plate>(module, "Plate").def(py::init(&plate_of));
   py::class_<TraceRequest>(module, "TraceRequest")
-      .def(py::init<>())
-      .def_readwrite("positions", &TraceRequest::positions)
-      .def_readwrite("directions", &TraceRequest::directions)
-      .def_readwrite("flexibilities", &TraceRequest::flexibilities)
-      .def_readwrite("along", &TraceRequest::along)
-      .def_readwrite("turning", &TraceRequest::turning)
-      .def_readwrite("plate", &TraceRequest::plate)
-      .def_readwrite("eigenvalues", &TraceRequest::eigenvalues)
-      .def_readwrite("interpolation", &TraceRequest::interpolation)
-      .def_readwrite("border", &TraceRequest::border)
-      .def_readwrite("smooth", &TraceRequest::smooth)
-      .def_readwrite("method", &TraceRequest::method)
-      .def_readwrite("paths", &TraceRequest::paths)
-      .def_property("scale", nullptr, [](TraceRequest& self, double value) { self.bending.scale = value; })
-      .def_property("step", nullptr, [](TraceRequest& self, double value) { self.bending.step = value; })
-      .def_property("max_steps", nullptr, [](TraceRequest& self, int value) { self.bending.max_steps = value; })
-      .def_property("max_length", nullptr, [](TraceRequest& self, double value) { self.bending.max_length = value; });
+      .def(py::init<Doubles, Doubles, Doubles, std::optional<Doubles>, std::optional<Doubles>, std::optional<Plate>,
+                    std::string, std::string, std::string, double, std::string, double, double, int, double, bool>());
   module.def("trace", &trace_for_python);
   module.def("landings", &landings);
   std::vector<std::string> ends;

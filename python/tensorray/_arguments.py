@@ -61,14 +61,11 @@ def request_of(function, scene, field, *, changes, frame, folder, seed=None, out
         if field is None:
             raise ValueError(f"{function}: give a scene, a field, or both")
         scene = _FIELD_ALONE
-    request = _tensorray.SceneRequest()
     if isinstance(scene, collections.abc.Mapping):
-        request.file, request.json = os.path.join(os.fspath(folder) if folder else "", "scene"), json_of(scene)
+        file, text = os.path.join(os.fspath(folder) if folder else "", "scene"), json_of(scene)
     elif folder:
         raise ValueError("folder: only for scenes that are dictionaries; a file's own folder is that of its paths")
     else:
-        request.file = os.fspath(scene)
-    request.changes, request.frame = changes_of(changes, seed), frame
-    request.outputs, request.keep = outputs, keep
-    request.field = None if field is None else module_field(function, field)
-    return request
+        file, text = os.fspath(scene), ""
+    own = None if field is None else module_field(function, field)
+    return _tensorray.SceneRequest(file, text, changes_of(changes, seed), frame, own, outputs, keep)

@@ -80,20 +80,16 @@ def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLik
     are the columns of its position's Jacobian: where this is zero there is a caustic.
     """
     starts, headings, flexibilities = _rays(positions, directions, s)
-    request = _tensorray.TraceRequest()
-    request.positions, request.directions, request.flexibilities = starts, headings, flexibilities
     if jacobians or along is not None or turning is not None:
         along = _across(headings) if along is None else _for_all(along, len(starts))
-        request.along = along
-        request.turning = None if turning is None else _for_all(turning, len(starts))
+        turning = None if turning is None else _for_all(turning, len(starts))
     if plate is not None:
-        request.plate = _tensorray.Plate(*(np.asarray(part, float).ravel() for part in
-                                           (plate.center, plate.normal, plate.up, plate.size)))
-    request.eigenvalues, request.smooth = eigenvalues, float(smooth)
-    request.method, request.paths = method, ways
-    request.interpolation, request.border = interpolation, border
-    request.scale, request.step, request.max_steps = float(scale), float(step or 0), int(max_steps)
-    request.max_length = math.inf if max_length is None else float(max_length)
+        plate = _tensorray.Plate(*(np.asarray(part, float).ravel() for part in
+                                   (plate.center, plate.normal, plate.up, plate.size)))
+    request = _tensorray.TraceRequest(
+        starts, headings, flexibilities, along, turning, plate, eigenvalues, interpolation, border, float(smooth),
+        method, float(scale), float(step or 0), int(max_steps),
+        math.inf if max_length is None else float(max_length), ways)
     with shown(progress) as report:
         return Trace(**_tensorray.trace(module_field("trace", field), request, threads, report), along=along)
 

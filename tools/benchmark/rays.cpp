@@ -3,7 +3,6 @@
 /// the same linear field, and `trace` with the defaults (cubic fields, steps of order four).
 
 #include <array>
-#include <cmath>
 #include <map>
 #include <memory>
 #include <vector>

@@ -2,11 +2,9 @@
 /// Seconds from a page's message with a changed scale to a picture's bytes, without the network: the first, coarse
 /// picture and the finished one.
 
-#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 #include <mutex>
 #include <string>
 
@@ -18,8 +16,6 @@
 
 namespace tensorray::bench {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// A page that waits for the answers to its scenes.
 class TimedPage {

@@ -16,19 +16,14 @@ void add_render_command(CLI::App& program, Progress& progress);   ///< tensorray
 void add_explore_command(CLI::App& program, Progress& progress);  ///< tensorray explore FIELD.vdb: a sheet of pictures.
 void add_merge_command(CLI::App& program, Progress& progress);    ///< tensorray merge SHARD...: pictures of shards.
 void add_make_command(CLI::App& program, Progress& progress);     ///< tensorray make KIND: an analytic field.
-void add_import_command(CLI::App& program);  ///< Lists `import` in --help; become_import_program runs it.
-void add_view_command(CLI::App& program);    ///< Lists `view` in --help; become_view_program runs it.
-void add_derive_command(CLI::App& program, Progress& progress);  ///< tensorray derive FIELD.vdb: its invariants.
-void add_info_command(CLI::App& program);                        ///< tensorray info FILE.vdb: what a file holds.
-void add_schema_command(CLI::App& program);                      ///< tensorray schema: the JSON Schema of scenes.
+void add_derive_command(CLI::App& program, Progress& progress);   ///< tensorray derive FIELD.vdb: its invariants.
+void add_info_command(CLI::App& program);                         ///< tensorray info FILE.vdb: what a file holds.
+void add_schema_command(CLI::App& program);                       ///< tensorray schema: the JSON Schema of scenes.
 
 /// Replaces this program by `tensorray-import`, which runs `tensorray import`, because only `tensorray-import`
 /// contains VTK.
 /// @param arguments  Those of main, from "import" on.
 /// @throw std::runtime_error with the fix if `tensorray-import` is not built.
 [[noreturn]] void become_import_program(char** arguments);
-
-/// The same for `tensorray view` and `tensorray-view`, which contains the web server.
-[[noreturn]] void become_view_program(char** arguments);
 
 }  // namespace tensorray

@@ -5,8 +5,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "base/process/child_program.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"
@@ -42,10 +40,6 @@ std::filesystem::path import_program() {
 }
 
 }  // namespace
-
-void add_import_command(CLI::App& program) {
-  program.add_subcommand("import", "Make a tensor field of another program's file");
-}
 
 void become_import_program(char** arguments) {
   // A library that VTK may bring (UCX, of MPI) otherwise prints a trace of calls when the reader of a damaged file

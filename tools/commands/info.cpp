@@ -120,9 +120,8 @@ Json to_json(const FieldInfo& field) {
 
 void print_json(const InfoOptions& options, const std::vector<GridInfo>& grids, const std::vector<FieldInfo>& fields) {
   Json json = {{"file", text_of_path(options.file)}, {"grids", Json::array()}, {"fields", Json::array()}};
-  for (const GridInfo& grid : grids) {
+  for (const GridInfo& grid : grids)
     json["grids"].push_back({{"name", grid.name}, {"type", grid.type}, {"storage", grid.storage}});
-  }
   for (const FieldInfo& field : fields) json["fields"].push_back(to_json(field));
   fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
 }
@@ -134,9 +133,8 @@ void print_row(const std::string& label, const std::string& value) { fmt::print(
 template <class Vector>
 std::string text(const Vector& vector) {
   std::string numbers;
-  for (Eigen::Index i = 0; i < vector.size(); ++i) {
+  for (Eigen::Index i = 0; i < vector.size(); ++i)
     numbers += fmt::format("{}{:.6g}", i == 0 ? "" : " ", static_cast<double>(vector[i]));
-  }
   return numbers;
 }
 
@@ -151,9 +149,7 @@ std::string percent(double fraction) { return fmt::format("{:.4g} %", std::round
 
 void print_grid(const FieldInfo& field) {
   const FieldStatistics& s = field.statistics;
-  for (int i = 0; i < 4; ++i) {
-    print_row(i == 0 ? "index to world" : "", text(Eigen::Vector4d(field.transform.row(i))));
-  }
+  for (int i = 0; i < 4; ++i) print_row(i == 0 ? "index to world" : "", text(Eigen::Vector4d(field.transform.row(i))));
   print_row("extent, index", box_text(s.index_box));
   print_row("extent, world", box_text(s.world_box));
   print_row("voxel size", text(s.voxel_size));
@@ -205,23 +201,17 @@ void print_text(const InfoOptions& options, const std::vector<GridInfo>& grids, 
   fmt::print("{}\n  {:<{}}  {:<10}  {}\n", options.file.string(), "grid", width, "type", "stored as");
   for (const GridInfo& grid : grids) fmt::print("  {:<{}}  {:<10}  {}\n", grid.name, width, grid.type, grid.storage);
   for (const FieldInfo& field : fields) print_field(field);
-  if (fields.empty()) {
+  if (fields.empty())
     fmt::print(
         "no tensor field; `--derive gradient` tells of that of a vector grid, `--derive hessian` of that of a scalar "
-        "grid, "
-        "and `field.derive` in a scene makes it\n");
-  }
+        "grid, and `field.derive` in a scene makes it\n");
 }
 
 void info(const InfoOptions& options) {
   const Threads threads;
   const std::vector<GridInfo> grids = list_vdb(options.file);
   const std::vector<FieldInfo> fields = field_infos(options, grids);
-  if (options.json) {
-    print_json(options, grids, fields);
-  } else {
-    print_text(options, grids, fields);
-  }
+  (options.json ? print_json : print_text)(options, grids, fields);
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -35,9 +36,8 @@ struct MakeOptions {
 template <class Derived>
 std::string numbers(const Eigen::DenseBase<Derived>& values) {
   std::string text;
-  for (Eigen::Index i = 0; i < values.rows(); ++i) {
+  for (Eigen::Index i = 0; i < values.rows(); ++i)
     for (Eigen::Index j = 0; j < values.cols(); ++j) text += fmt::format("{}{}", text.empty() ? "" : " ", values(i, j));
-  }
   return text;
 }
 
@@ -71,9 +71,7 @@ class FlagMaker {
 
  private:
   static std::string flag(std::string key) {
-    for (char& c : key) {
-      if (c == '_') c = '-';
-    }
+    std::replace(key.begin(), key.end(), '_', '-');
     return "--" + key;
   }
 
@@ -90,13 +88,11 @@ class FlagMaker {
 };
 
 void set_resolution(GridRequest& grid, const std::vector<int>& values) {
-  if (values.size() == 1) {
+  if (values.size() == 2) throw CLI::ValidationError("--resolution", "needs one number, or three: x y z");
+  if (values.size() == 1)
     grid.resolution = values[0];
-  } else if (values.size() == 3) {
+  else
     grid.resolution = Eigen::Vector3i(values.data());
-  } else {
-    throw CLI::ValidationError("--resolution", "needs one number, or three: x y z");
-  }
 }
 
 void add_grid_flags(CLI::App& command, GridRequest& grid) {
@@ -161,18 +157,14 @@ void add_kind(CLI::App& parent, const std::string& kind, Progress& progress) {
 
 void add_make_command(CLI::App& program, Progress& progress) {
   CLI::App* command = program.add_subcommand("make", "Make an analytic tensor field");
-  std::string kinds;
-  for (const std::string& kind : generator_kinds()) {
-    add_kind(*command, kind, progress);
-    kinds += (kinds.empty() ? "" : ", ") + kind;
-  }
+  for (const std::string& kind : generator_kinds()) add_kind(*command, kind, progress);
   // CLI11 treats an unknown kind as an extra argument. Allow extras, so that the error can list the kinds.
   command->require_subcommand(0, 1)->allow_extras();
-  command->callback([command, kinds] {
+  command->callback([command] {
     if (!command->get_subcommands().empty()) return;
     const std::vector<std::string> words = command->remaining();
     const std::string wrong = words.empty() ? "KIND is missing" : "unknown kind " + words.front();
-    throw CLI::ValidationError("make", wrong + "; the kinds are " + kinds);
+    throw CLI::ValidationError("make", wrong + "; the kinds are " + joined(generator_kinds()));
   });
 }
 

@@ -165,14 +165,6 @@ void render_alone_or_with_others(const RenderOptions& options, Progress& progres
   if (is_root(ranks.get())) report_failed(failed);
 }
 
-void add_import_options(CLI::App& command, ImportChoices& import) {
-  for (const auto& [flag, meaning] : {std::pair("--order", "Of the tensor's components, as for `tensorray import`"),
-                                      std::pair("--array", "The array that is the tensor, likewise"),
-                                      std::pair("--gradient-of", "The velocity whose gradient it is, likewise"),
-                                      std::pair("--frame", "The axes of the components, likewise")})
-    command.add_option(flag, import[flag], meaning)->group("Import");
-}
-
 }  // namespace
 
 void add_render_command(CLI::App& program, Progress& progress) {
@@ -224,7 +216,11 @@ void add_render_command(CLI::App& program, Progress& progress) {
       ->transform(CLI::AsSizeValue(false))
       ->option_text("SIZE");
   command->add_flag("--watch", options->run.keeping.watch, "Keep the pictures up to date while they are rendered");
-  add_import_options(*command, options->import);
+  for (const auto& [flag, meaning] : {std::pair("--order", "Of the tensor's components, as for `tensorray import`"),
+                                      std::pair("--array", "The array that is the tensor, likewise"),
+                                      std::pair("--gradient-of", "The velocity whose gradient it is, likewise"),
+                                      std::pair("--frame", "The axes of the components, likewise")})
+    command->add_option(flag, options->import[flag], meaning)->group("Import");
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");
   command->callback([options, &progress] { render_alone_or_with_others(*options, progress); });
 }

@@ -2,10 +2,8 @@
 /// @file tools/rendering/checkpoint.h
 /// Checkpoints of a render: written while it runs, and read by the one that continues it.
 
-#include <atomic>
 #include <condition_variable>
 #include <filesystem>
-#include <functional>
 #include <mutex>
 #include <optional>
 #include <thread>

@@ -26,52 +26,6 @@ void require_file(const std::filesystem::path& scene_file) {
                      ": a sequence reads its scene for each frame, and a pipe is read once; save the scene to a file");
 }
 
-/// @throw SceneError if two frames have a file in common.
-void check_names(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
-                 const RenderRun& run) {
-  std::vector<std::vector<std::filesystem::path>> names;
-  for (std::size_t i = 0; i < frames.size() && names.size() < 2; ++i) {
-    changes.frame = frames[i];
-    try {
-      names.push_back(files_of(read_scene(scene_file, changes), at_frame(run, frames[i])));
-    } catch (const std::invalid_argument&) {
-      if (!run.keep_going) throw;  // Else it is reported when its turn comes.
-    }
-  }
-  if (names.size() < 2) return;
-  for (const std::filesystem::path& name : names[0])
-    if (std::find(names[1].begin(), names[1].end(), name) != names[1].end())
-      throw SceneError(
-          printable(fmt::format("{}: each frame would replace it; count frames by # in its name, as in "
-                                "picture.####.png",
-                                name.string())));
-}
-
-/// What the frames have in common: the scale and the direction, where scenes leave them open. They are those of the
-/// first frame; where the run keeps going, of the first one that can be loaded, or nothing if none can: each then fails
-/// when its turn comes.
-Json values_of_first(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
-                     const RenderRun& run, std::optional<Scene>& loaded, Progress& progress) {
-  for (const int frame : frames) {
-    try {
-      changes.frame = frame;
-      const SceneDescription first = read_scene(scene_file, changes);
-      bound_memory_of(run, first);
-      if (!first.field.scale || !first.light.direction) loaded = load_scene(first, progress);
-      const Eigen::Vector3d direction = loaded ? *loaded->description.light.direction : *first.light.direction;
-      return {{"scale", loaded ? loaded->scale.scale : *first.field.scale},
-              {"direction", {direction.x(), direction.y(), direction.z()}}};
-    } catch (const Cancelled&) {
-      throw;
-    } catch (const std::invalid_argument&) {
-      if (!run.keep_going || frame == frames.back()) throw;
-    } catch (const std::exception&) {
-      if (!run.keep_going) throw;
-    }
-  }
-  return Json::object();
-}
-
 /// Whether the files of a frame are there, and complete. A name that cannot be looked at does not exist; opening the
 /// file says why.
 bool is_rendered(const SceneDescription& description, const RenderRun& run) {
@@ -91,13 +45,52 @@ class Sequence {
     run_.ranks = nullptr;  // Each frame is that of one rank.
   }
 
+  /// @throw SceneError if two frames have a file in common.
+  void check_names(const std::vector<int>& frames) {
+    std::vector<std::vector<std::filesystem::path>> names;
+    for (std::size_t i = 0; i < frames.size() && names.size() < 2; ++i) {
+      try {
+        names.push_back(files_of(description_at(frames[i]), at_frame(run_, frames[i])));
+      } catch (const std::invalid_argument&) {
+        if (!run_.keep_going) throw;  // Else it is reported when its turn comes.
+      }
+    }
+    if (names.size() < 2) return;
+    for (const std::filesystem::path& name : names[0])
+      if (std::find(names[1].begin(), names[1].end(), name) != names[1].end())
+        throw SceneError(printable(fmt::format(
+            "{}: each frame would replace it; count frames by # in its name, as in picture.####.png", name.string())));
+  }
+
+  /// What the frames have in common: the scale and the direction, where scenes leave them open. They are those of the
+  /// first frame; where the run keeps going, of the first one that can be loaded, or nothing if none can: each then
+  /// fails when its turn comes.
+  Json common_values(const std::vector<int>& frames) {
+    for (const int frame : frames) {
+      try {
+        const SceneDescription first = description_at(frame);
+        bound_memory_of(run_, first);
+        if (!first.field.scale || !first.light.direction) loaded_ = load_scene(first, progress_);
+        const Eigen::Vector3d direction = loaded_ ? *loaded_->description.light.direction : *first.light.direction;
+        return {{"scale", loaded_ ? loaded_->scale.scale : *first.field.scale},
+                {"direction", {direction.x(), direction.y(), direction.z()}}};
+      } catch (const Cancelled&) {
+        throw;
+      } catch (const std::invalid_argument&) {
+        if (!run_.keep_going || frame == frames.back()) throw;
+      } catch (const std::exception&) {
+        if (!run_.keep_going) throw;
+      }
+    }
+    return Json::object();
+  }
+
   /// Those that are left.
   std::vector<int> left(std::vector<int> frames) {
     if (!run_.skip_existing) return frames;
     const auto is_done = [&](int frame) {
-      changes_.frame = frame;
       try {
-        return is_rendered(read_scene(scene_file_, changes_), at_frame(run_, frame));
+        return is_rendered(description_at(frame), at_frame(run_, frame));
       } catch (const std::exception&) {
         return false;  // It is reported when its turn comes.
       }
@@ -106,15 +99,10 @@ class Sequence {
     return frames;
   }
 
-  std::string common_values(const std::vector<int>& frames) {
-    return values_of_first(scene_file_, changes_, frames, run_, loaded_, progress_).dump();
-  }
-
   /// With --keep-going, a frame that fails is noted, and others follow.
   void render(int frame, const Json& common) {
     try {
-      changes_.frame = frame;
-      SceneDescription description = read_scene(scene_file_, changes_);
+      SceneDescription description = description_at(frame);
       if (common.contains("scale")) set_chosen(common, description);
       bound_memory_of(run_, description);
       tell({fmt::format("frame {}", frame)}, run_.quiet);
@@ -135,6 +123,11 @@ class Sequence {
   std::vector<int> failed;
 
  private:
+  SceneDescription description_at(int frame) {
+    changes_.frame = frame;
+    return read_scene(scene_file_, changes_);
+  }
+
   const std::filesystem::path scene_file_;
   SceneChanges changes_;
   RenderRun run_;
@@ -152,8 +145,8 @@ std::vector<int> render_frames(const std::filesystem::path& scene_file, SceneCha
   std::string common;
   if (is_root(run.ranks)) {  // What is wrong with the scene is said once.
     require_file(scene_file);
-    check_names(scene_file, changes, frames, run);
-    common = sequence.common_values(frames);
+    sequence.check_names(frames);
+    common = sequence.common_values(frames).dump();
     frames = sequence.left(std::move(frames));
   }
   broadcast_list(run.ranks, frames);

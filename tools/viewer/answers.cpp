@@ -157,12 +157,10 @@ Json spectrum_at(const Render& render, const Vector2d& place) {
 
 Json describe_field(const Scene& scene) {
   const Eigen::AlignedBox3d& voxels = scene.field.voxels();
-  const Vector3d counts = voxels.sizes() + Vector3d::Ones();
+  const Eigen::Vector3i size = (voxels.sizes() + Vector3d::Ones()).array().round().matrix().cast<int>();
   Json corners = Json::array();
   for (const Vector3d& corner : scene.field.corners()) corners.push_back(to_json(corner));
-  Json size = Json::array();
-  for (int i = 0; i < 3; ++i) size.push_back(static_cast<int>(std::lround(counts[i])));
-  return {{"voxels", std::move(size)}, {"corners", std::move(corners)}};
+  return {{"voxels", {size.x(), size.y(), size.z()}}, {"corners", std::move(corners)}};
 }
 
 Json describe_choices(const Scene& scene, const Render& render) {

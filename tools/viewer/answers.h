@@ -3,7 +3,6 @@
 /// What a page can ask about a scene and its picture. All functions return messages of the page's protocol
 /// (tools/viewer/page/src/state/protocol.ts), without `type` and `id`.
 
-#include <memory>
 #include <vector>
 
 #include <Eigen/Core>
@@ -39,8 +38,7 @@ class LandedRays {
  private:
   struct Colour {
     double flexibility = 0;
-    std::vector<Eigen::Vector2d>
-        landings;  ///< Parts of the plate, from its top left corner; NaN where light does not land.
+    std::vector<Eigen::Vector2d> landings;  ///< Parts of the plate, from its top left corner; NaN: none.
   };
   std::vector<Eigen::Vector3d> starts_;  ///< World; (cells + 1)² positions, row by row.
   std::vector<Colour> colours_;

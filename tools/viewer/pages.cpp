@@ -5,7 +5,6 @@
 #include <fstream>
 #include <future>
 #include <iterator>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -26,7 +25,7 @@ constexpr std::size_t max_requests = 32;  // Of one page, waiting.
 constexpr int coarsest = 16;
 constexpr double soon = 0.1, very_soon = 0.03;  // Seconds that a first picture may take, and that allow a finer one.
 
-const std::set<std::string> request_types{"look", "space", "save", "export"};
+const std::vector<std::string> request_types{"scene", "look", "space", "save", "export"};
 
 PageMessage text_message(Json message) {
   return {false, false, message.dump(-1, ' ', false, Json::error_handler_t::replace)};
@@ -79,9 +78,8 @@ Json parsed(const std::string& text) {
   if (!message.is_object() || !message.contains("type") || !message["type"].is_string())
     throw std::invalid_argument("a message has no `type`");
   const std::string type = message["type"];
-  if (type != "scene" && request_types.count(type) == 0)
-    throw std::invalid_argument("unknown message `" + printable(type) +
-                                "`; there are scene, look, space, save, export");
+  if (std::find(request_types.begin(), request_types.end(), type) == request_types.end())
+    throw std::invalid_argument("unknown message `" + printable(type) + "`; there are " + joined(request_types));
   constexpr std::size_t longest = 1 << 16;
   if (type != "scene" && type != "save" && text.size() > longest)
     throw std::invalid_argument("the message `" + type + "` is too long");
@@ -102,7 +100,7 @@ double number(const Json& message, const char* key) {
 Pages::Pages(const ViewedScene& viewed, const Progress& progress)
     : viewed_(viewed),
       scene_(scene_json(viewed.file, viewed.overrides)),
-      allowed_(read_scene_json(scene_, viewed.file)),
+      allowed_(resolved_files(read_scene_json(scene_, viewed.file))),
       live_(viewed.file) {
   const SceneDescription description = read_scene_json(scene_, viewed.file);
   require_distinct_files(input_files(description), {{viewed.copy, "the file that a page saves to"}});
@@ -205,7 +203,7 @@ void Pages::serve(const PagePointer& page) {
 
 void Pages::check(const Json& scene) const {
   const SceneDescription description = read_scene_json(scene, viewed_.file);
-  allowed_.require(description);
+  require_files(description, allowed_);
   require_moderate(description);
 }
 
@@ -250,7 +248,7 @@ void Pages::load_for(Page& page, const Stage& stage) {
 void Pages::make_stage(const PagePointer& page) {
   const Stage stage = page->stages.front();
   page->stages.pop_front();
-  const bool is_first = stage.coarseness > 1 && stage.samples == 1;
+  const bool is_first = stage.is_first();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (page->scene && !is_first) return;
@@ -314,9 +312,9 @@ void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading)
   for (const Json& phase : phases) seconds += phase.get<double>();
   const Json header{{"type", "picture"},
                     {"id", page.shown_id},
-                    {"stage", stage.coarseness > 1 && stage.samples == 1 ? 0
-                              : stage.is_final()                         ? 2
-                                                                         : 1},
+                    {"stage", stage.is_first()   ? 0
+                              : stage.is_final() ? 2
+                                                 : 1},
                     {"final", stage.is_final()},
                     {"width", page.display.width},
                     {"height", page.display.height},

@@ -11,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -20,7 +21,6 @@
 #include "scenes/keys/json_reader.h"
 #include "tools/viewer/answers.h"
 #include "tools/viewer/live_scene.h"
-#include "tools/viewer/request_limits.h"
 #include "tools/viewer/stages.h"
 
 namespace tensorray {
@@ -107,8 +107,8 @@ class Pages {
   void check(const Json& scene) const;
 
   const ViewedScene viewed_;
-  Json scene_, field_;  ///< The scene that all pages begin with, and the description of its field.
-  AllowedFiles allowed_;
+  Json scene_, field_;                       ///< The scene that all pages begin with, and the description of its field.
+  std::set<std::filesystem::path> allowed_;  ///< Files that scenes of pages may name.
   TemporaryFolder folder_;
   LiveScene live_;
   int coarseness_ = 8;  ///< Of first pictures; it follows the time that they take.

@@ -2,8 +2,32 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
+#include "base/text/text.h"
+#include "scenes/description/run_files.h"
+
 namespace tensorray {
 namespace {
+
+constexpr double max_pixels = 2048.0 * 2048;
+constexpr double max_positions = 1 << 22;
+constexpr double max_generated_voxels = 256.0 * 256 * 256;
+constexpr int max_bands = 512;
+constexpr double max_ray_steps = 1 << 22;  // Of one ray, which cannot be interrupted.
+
+std::filesystem::path resolved(const std::filesystem::path& file) {
+  std::error_code none;
+  const std::filesystem::path path = std::filesystem::weakly_canonical(std::filesystem::absolute(file), none);
+  return none ? file : path;
+}
+
+void require_at_most(double limit, double value, const char* key, const SceneDescription& scene) {
+  if (value > limit)
+    throw SceneError(
+        fmt::format("{}: `{}`: too large for a live view, which takes {:g} at most; use `tensorray render`",
+                    printable(scene.path.string()), key, limit));
+}
 
 constexpr std::uint64_t min_positions = 1024;
 constexpr int few_samples = 4;
@@ -21,6 +45,33 @@ Json& section(Json& json, const char* key) {
 }
 
 }  // namespace
+
+std::set<std::filesystem::path> resolved_files(const SceneDescription& scene) {
+  std::set<std::filesystem::path> files;
+  for (const NamedFile& file : input_files(scene))
+    if (!file.path.empty()) files.insert(resolved(file.path));
+  return files;
+}
+
+void require_files(const SceneDescription& scene, const std::set<std::filesystem::path>& allowed) {
+  for (const NamedFile& file : input_files(scene))
+    if (!file.path.empty() && allowed.count(resolved(file.path)) == 0)
+      throw SceneError(printable(
+          fmt::format("{}: {} is not a file of the scene that this view was started with; a page may use no other",
+                      file.name, file.path.string())));
+}
+
+void require_moderate(const SceneDescription& scene) {
+  if (scene.receiver.resolution)
+    require_at_most(max_pixels, scene.receiver.resolution->cast<double>().prod(), "/receiver/resolution", scene);
+  require_at_most(max_pixels, scene.camera.resolution.cast<double>().prod(), "/camera/resolution", scene);
+  require_at_most(max_positions, static_cast<double>(scene.light.photons), "/light/photons", scene);
+  require_at_most(max_bands, scene.light.wavelength_count, "/light/wavelengths/count", scene);
+  require_at_most(max_ray_steps, scene.bending.settings.max_steps, "/bending/max_steps", scene);
+  if (scene.field.generate)
+    require_at_most(max_generated_voxels, scene.field.generate->grid.resolution.cast<double>().prod(),
+                    "/field/generate/resolution", scene);
+}
 
 std::deque<Stage> stages_of(int coarseness, bool is_sampled) {
   std::deque<Stage> stages;

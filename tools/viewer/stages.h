@@ -1,9 +1,10 @@
 #pragma once
 /// @file tools/viewer/stages.h
-/// The pictures that a page gets of one scene: coarse ones first.
+/// What a page may ask for, and the pictures that it gets of one scene: coarse ones first.
 
 #include <deque>
 #include <filesystem>
+#include <set>
 #include <vector>
 
 #include <Eigen/Core>
@@ -12,6 +13,16 @@
 
 namespace tensorray {
 
+/// The files that a scene names, without symbolic links.
+std::set<std::filesystem::path> resolved_files(const SceneDescription& scene);
+
+/// @throw SceneError naming the key of a file that is not among those of the scene that the server was started with.
+void require_files(const SceneDescription& scene, const std::set<std::filesystem::path>& allowed);
+
+/// @throw SceneError naming the key, if the picture, the number of rays or a generated field is so large that it would
+/// keep the server busy for long, or fill its memory.
+void require_moderate(const SceneDescription& scene);
+
 /// How one picture of a scene is made.
 struct Stage {
   int coarseness = 1;        ///< Edge of its pixels, in pixels of the finished picture.
@@ -19,6 +30,7 @@ struct Stage {
   bool all_outputs = false;  ///< Whether the picture comes with all that a page can ask of it.
   bool is_known = false;     ///< Whether the page has this picture already.
 
+  bool is_first() const { return coarseness > 1 && samples == 1; }
   bool is_final() const { return coarseness == 1 && samples == 0; }
 };
 

@@ -1,15 +1,12 @@
 /// @file tools/viewer/program/tensorray_view.cpp
 /// The program `tensorray-view`: a web server for the live view. `tensorray view` starts it.
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
-#include <string>
 #include <system_error>
-#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

@@ -54,6 +54,10 @@ function ask_and_tell(request: Request): number | null {
   return id;
 }
 
+function ask_for_look(): void {
+  if (picture.mark) looks.ask(picture.mark);
+}
+
 function make_space_pane(): SpacePane | null {
   try {
     return new SpacePane(by_id("space-frame"), picture.canvas);
@@ -71,44 +75,33 @@ function on_connection(connected: boolean): void {
   for (const queue of [scenes, looks, spaces]) queue.reset();
 }
 
+const answers: { [Type in TextMessage["type"]]: (message: Extract<TextMessage, { type: Type }>) => void } = {
+  hello: on_hello,
+  progress: (message) => status_line.show_progress(message),
+  details: ask_for_look,
+  error: on_error,
+  look: (message) => {
+    looks.answered(message.id);
+    status_line.settle();
+    read_out.show(message);
+    space_pane?.show_look(message.rays);
+  },
+  space: (message) => {
+    spaces.answered(message.id);
+    status_line.settle();
+    if (message.field) on_field(message.field);
+    space_pane?.show_space(message, ["photon_distribution", "lens"].includes(rendered_method()));
+  },
+  saved: (message) => show_toast("Saved as " + message.file),
+};
+
 function on_text(message: TextMessage): void {
-  switch (message.type) {
-    case "hello":
-      on_hello(message);
-      break;
-    case "progress":
-      status_line.show_progress(message);
-      break;
-    case "details":
-      if (picture.mark) looks.ask(picture.mark);
-      break;
-    case "error":
-      on_error(message);
-      break;
-    case "look":
-      looks.answered(message.id);
-      status_line.settle();
-      read_out.show(message);
-      space_pane?.show_look(message.rays);
-      break;
-    case "space":
-      spaces.answered(message.id);
-      status_line.settle();
-      if (message.field) on_field(message.field);
-      space_pane?.show_space(message, ["photon_distribution", "lens"].includes(rendered_method()));
-      break;
-    case "saved":
-      show_toast("Saved as " + message.file);
-      break;
-  }
+  (answers[message.type] as (message: TextMessage) => void)(message);
 }
 
 function on_binary({ header, content }: BinaryMessage): void {
-  if (header.type === "file") {
-    download(header.name, content);
-  } else {
-    on_picture(header, content);
-  }
+  if (header.type === "file") download(header.name, content);
+  else on_picture(header, content);
 }
 
 function on_hello(message: Hello): void {
@@ -147,11 +140,10 @@ function on_picture(header: PictureHeader, content: Uint8Array<ArrayBuffer>): vo
   state.examples = header.examples;
   form.update();
   void picture.draw(header, content).catch(() => status_line.show_error("The picture cannot be decoded."));
-  by_id<HTMLButtonElement>("export-png").disabled = !header.final;
-  by_id<HTMLButtonElement>("export-exr").disabled = !header.final;
+  for (const id of ["export-png", "export-exr"]) by_id<HTMLButtonElement>(id).disabled = !header.final;
   if (header.final) {
     spaces.ask(true);
-    if (picture.mark) looks.ask(picture.mark);
+    ask_for_look();
   } else if (header.stage === 0) {
     read_out.age();
     spaces.ask(true);
@@ -177,16 +169,16 @@ function rendered_method(): string {
 
 let address_timer = 0;
 
-state.on_change(() => {
+state.on_change = () => {
   scenes.ask(state.scene);
   form.update();
-  by_id<HTMLButtonElement>("undo").disabled = !state.can_undo();
-  by_id<HTMLButtonElement>("redo").disabled = !state.can_redo();
+  by_id<HTMLButtonElement>("undo").disabled = state.past.length === 0;
+  by_id<HTMLButtonElement>("redo").disabled = state.future.length === 0;
   clearTimeout(address_timer);
   address_timer = window.setTimeout(() => {
     history.replaceState(null, "", location.pathname + location.search + fragment_of(state.patch()));
   }, address_delay);
-});
+};
 
 picture.on_pointer = (x, y) => looks.ask([x, y]);
 picture.on_drawn = () => space_pane?.picture_changed();
@@ -194,11 +186,11 @@ if (space_pane) {
   space_pane.on_plate = (x, y) => picture.point(x, y);
   space_pane.on_view = DirectionSphere.set_view;
 }
-theme.on_change(() => {
+theme.on_change = () => {
   read_out.restyle();
   space_pane?.restyle();
   form.update();
-});
+};
 make_tabs(by_id("tabs"), (tab) => form.show(tab.id === "tab-knobs"));
 
 by_id("undo").addEventListener("click", () => state.undo());
@@ -217,9 +209,8 @@ by_id("copy-command").addEventListener("click", () => {
   by_id("copy-command").dataset["command"] = text;
   void copy(text).then((done) => show_toast(done ? "Copied: " + text : text));
 });
-for (const file of ["png", "exr"] as const) {
+for (const file of ["png", "exr"] as const)
   by_id("export-" + file).addEventListener("click", () => ask_and_tell({ type: "export", file }));
-}
 
 window.addEventListener("hashchange", () => {
   const patch = patch_of(location.hash);

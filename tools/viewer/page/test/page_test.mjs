@@ -250,6 +250,7 @@ await check("the filter of all keys finds a key, and its row changes the scene",
   await page.click(row + " .reset");
   expect(await page.$eval(row, (node) => node.classList.contains("absent")), "the key is not removed");
   await page.click("#tab-knobs");
+  expect((await page.$$("#keys details:not([open])")).length === 0, "sections of the knobs are closed");
 });
 
 await check("PNG hands out a file", async () => {

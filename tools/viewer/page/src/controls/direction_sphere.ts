@@ -48,7 +48,7 @@ export class DirectionSphere implements Control {
         const name = (sign > 0 ? "+" : "−") + axis;
         const snap = button(name, { "data-snap": (sign > 0 ? "+" : "-") + axis, "aria-label": key.dotted + " " + name }, () => {
           key.set(direction.toArray());
-          key.finish(false);
+          key.state.finish(false);
         });
         this.snaps.push([direction, snap]);
         snaps.append(snap);
@@ -84,10 +84,10 @@ export class DirectionSphere implements Control {
   }
 
   private listen(): void {
-    on_drag(this.canvas, (x, y) => this.turn(x / radius, y / radius), () => this.key.finish(false));
+    on_drag(this.canvas, (x, y) => this.turn(x / radius, y / radius), () => this.key.state.finish(false));
     const turn = (x: number, y: number): void => {
       this.turn(key_angle * x, key_angle * y);
-      this.key.finish(true);
+      this.key.state.finish(true);
     };
     on_arrow_keys(this.canvas, turn, 0.2);
   }

@@ -88,12 +88,12 @@ export class FlexibilityLine implements Control {
     };
     on_drag(handle, drag, () => {
       this.held = false;
-      this.bending.finish(false);
+      this.bending.state.finish(false);
       this.update();
     });
     on_arrow_keys(handle, (x, y) => {
       this.move(i, this.values()[i]! + 0.01 * (x - y));
-      this.bending.finish(true);
+      this.bending.state.finish(true);
     });
   }
 

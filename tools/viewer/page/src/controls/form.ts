@@ -167,10 +167,9 @@ class Section implements Row {
     this.node.hidden = !itself && !found;
     if (this.details) {
       if (words.length > 0 && found && !this.details.open) {
-        this.details.open = true;
-        this.opened_by_filter = true;
+        this.details.open = this.opened_by_filter = true;
       } else if (words.length === 0 && this.opened_by_filter) {
-        this.details.open = false;
+        this.details.open = this.node.closest(".knobs") !== null;  // There all sections are open.
         this.opened_by_filter = false;
       }
     }

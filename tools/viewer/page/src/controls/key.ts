@@ -65,10 +65,6 @@ export class Key {
     this.state.set(parent, changed, gesture === "" ? null : this.dotted + gesture);
   }
 
-  finish(by_key: boolean): void {
-    this.state.finish(by_key);
-  }
-
   /** Makes the value automatic, or the default. */
   reset(): void {
     if (this.word !== null && this.given !== this.word) this.set(this.word);

@@ -110,7 +110,7 @@ class Slider implements Control {
     this.track.addEventListener("pointerup", () => (this.by_key = false));
     this.track.addEventListener("input", () => (this.number = this.value_of(this.track.valueAsNumber)));
     this.track.addEventListener("change", () => {
-      this.key.finish(this.by_key && !this.held);
+      this.key.state.finish(this.by_key && !this.held);
       this.held = false;
       this.by_key = false;
       this.update();
@@ -120,7 +120,7 @@ class Slider implements Control {
       if (event.key === "ArrowUp" || event.key === "ArrowDown") {
         event.preventDefault();
         this.number = this.value_of(this.track.valueAsNumber + (event.key === "ArrowUp" ? 10 : -10));
-        this.key.finish(true);
+        this.key.state.finish(true);
         this.show_number();
       }
       if (event.key === "Escape") {
@@ -132,7 +132,7 @@ class Slider implements Control {
       const value = Number(this.box.value.replace(",", "."));
       if (this.box.value.trim() !== "" && Number.isFinite(value)) {
         this.number = value;
-        this.key.finish(false);
+        this.key.state.finish(false);
       }
       this.show_number();
     });

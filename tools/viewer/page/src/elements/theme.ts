@@ -6,7 +6,8 @@ const marks = { system: "◐", light: "☀", dark: "☾" };
 
 export class Theme {
   private current: (typeof themes)[number];
-  private listeners: (() => void)[] = [];
+  /** Called when the colours are others. */
+  on_change: () => void = () => undefined;
   private readonly system = matchMedia("(prefers-color-scheme: dark)");
 
   constructor(private readonly switch_button: HTMLButtonElement) {
@@ -21,10 +22,6 @@ export class Theme {
     this.system.addEventListener("change", () => this.show());
   }
 
-  on_change(listener: () => void): void {
-    this.listeners.push(listener);
-  }
-
   private show(): void {
     const system = this.system.matches ? "dark" : "light";
     document.documentElement.dataset["theme"] = this.current === "system" ? system : this.current;
@@ -32,6 +29,6 @@ export class Theme {
     const name = this.current === "system" ? "as the system" : this.current;
     this.switch_button.title = "Theme: " + name;
     this.switch_button.setAttribute("aria-label", "Theme: " + name);
-    for (const listener of this.listeners) listener();
+    this.on_change();
   }
 }

@@ -49,10 +49,7 @@ export class Picture {
   async draw(header: PictureHeader, content: Uint8Array<ArrayBuffer>): Promise<void> {
     const order = ++this.newest;
     const bitmap = await createImageBitmap(new Blob([content], { type: header.format }));
-    if (order < this.newest) {
-      bitmap.close();
-      return;
-    }
+    if (order < this.newest) return bitmap.close();
     const reduction = Math.min(1, longest_side / Math.max(header.full_width, header.full_height));
     const width = Math.round(header.full_width * reduction);
     const height = Math.round(header.full_height * reduction);
@@ -66,9 +63,7 @@ export class Picture {
     context.clearRect(0, 0, width, height);
     context.drawImage(bitmap, 0, 0, width, height);
     bitmap.close();
-    this.canvas.dataset["picture"] = String(header.id);
-    this.canvas.dataset["stage"] = String(header.stage);
-    this.canvas.dataset["final"] = String(header.final);
+    Object.assign(this.canvas.dataset, { picture: header.id, stage: header.stage, final: header.final });
     this.canvas.hidden = false;
     this.fit();
     this.on_drawn();

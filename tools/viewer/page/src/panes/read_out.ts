@@ -15,9 +15,8 @@ export class ReadOut {
   private spectrum: Look["spectrum"] = null;
 
   constructor(private readonly container: HTMLElement) {
-    const column = element("div", { class: "read-out-column" }, this.hint, this.values);
-    container.append(column, this.plot_frame);
-    new ResizeObserver(() => this.fit()).observe(this.plot_frame);
+    container.append(element("div", { class: "read-out-column" }, this.hint, this.values), this.plot_frame);
+    new ResizeObserver(() => this.plot?.setSize(this.size())).observe(this.plot_frame);
   }
 
   show(look: Look): void {
@@ -30,9 +29,7 @@ export class ReadOut {
       this.swatch.setAttribute("aria-label", "colour " + look.color);
       this.swatch.title = look.color;
     }
-    this.values.append(
-      ...look.lines.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]),
-    );
+    this.values.append(...look.lines.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
     this.spectrum = look.spectrum;
     this.draw();
   }
@@ -50,17 +47,17 @@ export class ReadOut {
 
   /** Draws the spectrum in the colours of the theme. */
   restyle(): void {
-    this.plot?.destroy();
-    this.plot = null;
+    this.remove_plot();
     this.draw();
   }
 
+  private remove_plot(): void {
+    this.plot?.destroy();
+    this.plot = null;
+  }
+
   private draw(): void {
-    if (!this.spectrum || this.spectrum.nm.length < 2) {
-      this.plot?.destroy();
-      this.plot = null;
-      return;
-    }
+    if (!this.spectrum || this.spectrum.nm.length < 2) return this.remove_plot();
     const data: uPlot.AlignedData = [this.spectrum.nm, this.spectrum.values];
     if (this.plot) this.plot.setData(data);
     else this.plot = new uPlot(this.options(), data, this.plot_frame);
@@ -68,10 +65,6 @@ export class ReadOut {
 
   private size(): { width: number; height: number } {
     return { width: Math.max(80, this.plot_frame.clientWidth), height: Math.max(60, this.plot_frame.clientHeight) };
-  }
-
-  private fit(): void {
-    this.plot?.setSize(this.size());
   }
 
   private options(): uPlot.Options {

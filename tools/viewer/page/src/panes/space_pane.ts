@@ -123,7 +123,6 @@ export class SpacePane {
     this.build_field();
     this.build_space();
     this.show_look(this.look_rays);
-    this.request();
   }
 
   reset_view(): void {
@@ -194,12 +193,9 @@ export class SpacePane {
       const moved = Math.hypot(event.clientX - start[0], event.clientY - start[1]);
       if (moved > click_distance || !this.plate) return;
       const box = canvas.getBoundingClientRect();
-      const pointer = new three.Vector2(
-        ((event.clientX - box.left) / box.width) * 2 - 1,
-        1 - ((event.clientY - box.top) / box.height) * 2,
-      );
+      const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
       const caster = new three.Raycaster();
-      caster.setFromCamera(pointer, this.camera);
+      caster.setFromCamera(new three.Vector2(2 * x - 1, 1 - 2 * y), this.camera);
       const uv = caster.intersectObject(this.plate)[0]?.uv;
       if (uv) this.on_plate(uv.x, 1 - uv.y);
     });
@@ -210,12 +206,8 @@ export class SpacePane {
     if (!this.field) return;
     const corners = this.field.corners;
     const edges: Vector[] = [];
-    for (let i = 0; i < 8; ++i) {
-      for (const bit of [1, 2, 4]) {
-        const [a, b] = [corners[i], corners[i | bit]];
-        if ((i & bit) === 0 && a && b) edges.push(a, b);
-      }
-    }
+    for (let i = 0; i < 8; ++i)
+      for (const bit of [1, 2, 4]) if ((i & bit) === 0) edges.push(corners[i]!, corners[i | bit]!);
     this.field_group.add(thin_lines(edges.flat(), style_value("--ink-quiet")));
 
     const origin = new three.Vector3(...(corners[0] ?? [0, 0, 0]));
@@ -237,16 +229,12 @@ export class SpacePane {
     if (space.plate?.length === 4) this.add_plate(space.plate);
     if (space.beam) this.add_beam(space.beam);
     for (const mesh of this.meshes) {
-      const geometry = surface(mesh.positions, mesh.triangles);
+      const geometry = geometry_of(mesh.positions, mesh.triangles);
       geometry.computeVertexNormals();
       const limits = /body|bounds/i.test(mesh.name);
       const material = new three.MeshStandardMaterial({
-        color: limits ? "#7d92b5" : "#a08a6c",
-        roughness: 0.8,
-        side: three.DoubleSide,
-        transparent: true,
-        opacity: limits ? 0.25 : 0.75,
-        depthWrite: !limits,
+        color: limits ? "#7d92b5" : "#a08a6c", roughness: 0.8, side: three.DoubleSide,
+        transparent: true, opacity: limits ? 0.25 : 0.75, depthWrite: !limits,
       });
       this.space_group.add(new three.Mesh(geometry, material));
     }
@@ -258,7 +246,7 @@ export class SpacePane {
   }
 
   private add_plate(corners: Vector[]): void {
-    const geometry = surface(corners.flat(), [0, 1, 2, 0, 2, 3]);
+    const geometry = geometry_of(corners.flat(), [0, 1, 2, 0, 2, 3]);
     geometry.setAttribute("uv", new three.Float32BufferAttribute([0, 0, 1, 0, 1, 1, 0, 1], 2));
     const material = this.shows_picture
       ? new three.MeshBasicMaterial({ map: this.texture, side: three.DoubleSide, toneMapped: false })
@@ -287,12 +275,9 @@ export class SpacePane {
     const up = right.clone().cross(forward);
     const depth = this.field_sphere.radius * 0.4;
     const half = depth * Math.tan((view.fov * Math.PI) / 360);
+    const aspect = this.picture.width / this.picture.height;
     const corner = (x: number, y: number): Vector =>
-      eye
-        .clone()
-        .addScaledVector(forward, depth)
-        .addScaledVector(right, x * half * (this.picture.width / this.picture.height))
-        .addScaledVector(up, y * half)
+      eye.clone().addScaledVector(forward, depth).addScaledVector(right, x * half * aspect).addScaledVector(up, y * half)
         .toArray();
     const ring = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
     const lines = ring.flatMap((point, i): Vector[] => [eye.toArray(), point, point, ring[(i + 1) % 4]!]);
@@ -340,19 +325,17 @@ function clear(group: three.Group): void {
 
 /** Lines between pairs of points, in one colour, or in one for each point. */
 function thin_lines(ends: number[], color: string | number[]): three.LineSegments {
-  const geometry = new three.BufferGeometry();
-  geometry.setAttribute("position", new three.Float32BufferAttribute(ends, 3));
+  const geometry = geometry_of(ends, null);
   if (typeof color === "string") return new three.LineSegments(geometry, new three.LineBasicMaterial({ color }));
   geometry.setAttribute("color", new three.Float32BufferAttribute(color, 3));
   const material = new three.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.8 });
   return new three.LineSegments(geometry, material);
 }
 
-function surface(positions: number[], triangles: number[]): three.BufferGeometry {
+function geometry_of(positions: number[], triangles: number[] | null): three.BufferGeometry {
   const geometry = new three.BufferGeometry();
   geometry.setAttribute("position", new three.Float32BufferAttribute(positions, 3));
-  geometry.setIndex(triangles);
-  return geometry;
+  return geometry.setIndex(triangles);
 }
 
 /** Positions and colours of the rays' pieces, for lines. */

@@ -35,11 +35,8 @@ export class Connection {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => this.events.on_state(true);
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
-      if (typeof event.data === "string") {
-        this.events.on_text(JSON.parse(event.data) as TextMessage);
-      } else {
-        this.events.on_binary(parse_binary(event.data));
-      }
+      if (typeof event.data === "string") this.events.on_text(JSON.parse(event.data) as TextMessage);
+      else this.events.on_binary(parse_binary(event.data));
     };
     socket.onclose = () => {
       this.socket = null;

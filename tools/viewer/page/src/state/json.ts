@@ -12,9 +12,7 @@ export function is_object(value: Json | undefined): value is JsonObject {
 
 export function equal(a: Json | undefined, b: Json | undefined): boolean {
   if (a === b) return true;
-  if (Array.isArray(a) && Array.isArray(b)) {
-    return a.length === b.length && a.every((item, i) => equal(item, b[i]));
-  }
+  if (Array.isArray(a) && Array.isArray(b)) return a.length === b.length && a.every((item, i) => equal(item, b[i]));
   if (is_object(a) && is_object(b)) {
     const keys = Object.keys(a);
     return keys.length === Object.keys(b).length && keys.every((key) => key in b && equal(a[key], b[key]));
@@ -54,9 +52,7 @@ export function without_value(root: JsonObject, path: Path): JsonObject {
 /** The merge patch that makes `to` of `from`. Scenes contain no null, so it is exact. */
 export function merge_patch(from: JsonObject, to: JsonObject): JsonObject {
   const patch: JsonObject = {};
-  for (const key of Object.keys(from)) {
-    if (!(key in to)) patch[key] = null;
-  }
+  for (const key of Object.keys(from)) if (!(key in to)) patch[key] = null;
   for (const [key, value] of Object.entries(to)) {
     const old = from[key];
     if (equal(old, value)) continue;
@@ -68,14 +64,9 @@ export function merge_patch(from: JsonObject, to: JsonObject): JsonObject {
 export function apply_patch(root: JsonObject, patch: JsonObject): JsonObject {
   const result = { ...root };
   for (const [key, value] of Object.entries(patch)) {
-    if (value === null) {
-      delete result[key];
-    } else if (is_object(value)) {
-      const old = result[key];
-      result[key] = apply_patch(is_object(old) ? old : {}, value);
-    } else {
-      result[key] = value;
-    }
+    const old = result[key];
+    if (value === null) delete result[key];
+    else result[key] = is_object(value) ? apply_patch(is_object(old) ? old : {}, value) : value;
   }
   return result;
 }

@@ -30,30 +30,12 @@ export interface Hello {
   field: FieldInformation;
 }
 
-export interface Progress {
-  type: "progress";
-  id: number;
-  phase: string;
-  done: number;
-  total: number;
-}
+export type Progress = { type: "progress"; id: number; phase: string; done: number; total: number };
 
 /** Spectrum and maps of the last picture can be asked for now. */
-export interface Details {
-  type: "details";
-  id: number;
-}
-
-export interface Failure {
-  type: "error";
-  id: number;
-  message: string;
-}
-
-export interface Ray {
-  points: Vector[];
-  color: string;
-}
+export type Details = { type: "details"; id: number };
+export type Failure = { type: "error"; id: number; message: string };
+export type Ray = { points: Vector[]; color: string };
 
 export interface Look {
   type: "look";
@@ -64,11 +46,7 @@ export interface Look {
   rays: Ray[];
 }
 
-export interface Mesh {
-  name: string;
-  positions: number[];
-  triangles: number[];
-}
+export type Mesh = { name: string; positions: number[]; triangles: number[] };
 
 export interface Space {
   type: "space";
@@ -84,11 +62,7 @@ export interface Space {
   field?: FieldInformation;
 }
 
-export interface Saved {
-  type: "saved";
-  id: number;
-  file: string;
-}
+export type Saved = { type: "saved"; id: number; file: string };
 
 export type TextMessage = Hello | Progress | Details | Failure | Look | Space | Saved;
 
@@ -113,16 +87,9 @@ export interface PictureHeader {
   warnings?: string[];
 }
 
-export interface FileHeader {
-  type: "file";
-  id: number;
-  name: string;
-}
+export type FileHeader = { type: "file"; id: number; name: string };
 
-export interface BinaryMessage {
-  header: PictureHeader | FileHeader;
-  content: Uint8Array<ArrayBuffer>;
-}
+export type BinaryMessage = { header: PictureHeader | FileHeader; content: Uint8Array<ArrayBuffer> };
 
 /** Splits a binary message: the length of the header (4 bytes, little-endian), the header as JSON, the content. */
 export function parse_binary(data: ArrayBuffer): BinaryMessage {

@@ -13,16 +13,13 @@ export class State {
   /** What the render of the last picture has chosen where the scene leaves it open, and suggestions: as parts of scenes. */
   chosen: JsonObject = {};
   examples: JsonObject = {};
-  private past: JsonObject[] = [];
-  private future: JsonObject[] = [];
+  past: readonly JsonObject[] = [];
+  future: readonly JsonObject[] = [];
   private gesture: string | null = null;
   private gesture_open = false;
   private last_change = 0;
-  private listeners: (() => void)[] = [];
-
-  on_change(listener: () => void): void {
-    this.listeners.push(listener);
-  }
+  /** Called when the scene is another one. */
+  on_change: () => void = () => undefined;
 
   /** Begins with the scene of the server, changed by `patch`. */
   begin(original: JsonObject, patch: JsonObject): void {
@@ -31,7 +28,7 @@ export class State {
     this.past = [];
     this.future = [];
     this.gesture = null;
-    this.notify();
+    this.on_change();
   }
 
   get(path: Path): Json | undefined {
@@ -51,16 +48,13 @@ export class State {
     const now = Date.now();
     const same = gesture !== null && gesture === this.gesture;
     const continues = same && (this.gesture_open || now - this.last_change < repeat_time);
-    if (!continues) {
-      this.past.push(this.scene);
-      if (this.past.length > max_steps) this.past.shift();
-    }
+    if (!continues) this.past = [...this.past, this.scene].slice(-max_steps);
     this.future = [];
     this.gesture = gesture;
     this.gesture_open = gesture !== null;
     this.last_change = now;
     this.scene = scene;
-    this.notify();
+    this.on_change();
   }
 
   set(path: Path, value: Json, gesture: string | null = null): void {
@@ -81,32 +75,21 @@ export class State {
     this.last_change = Date.now();
   }
 
-  can_undo(): boolean {
-    return this.past.length > 0;
-  }
-
-  can_redo(): boolean {
-    return this.future.length > 0;
-  }
-
   undo(): void {
-    this.move(this.past, this.future);
+    this.move("past", "future");
   }
 
   redo(): void {
-    this.move(this.future, this.past);
+    this.move("future", "past");
   }
 
-  private move(from: JsonObject[], to: JsonObject[]): void {
-    const scene = from.pop();
+  private move(from: "past" | "future", to: "past" | "future"): void {
+    const scene = this[from].at(-1);
     if (!scene) return;
-    to.push(this.scene);
+    this[from] = this[from].slice(0, -1);
+    this[to] = [...this[to], this.scene];
     this.scene = scene;
     this.gesture = null;
-    this.notify();
-  }
-
-  private notify(): void {
-    for (const listener of this.listeners) listener();
+    this.on_change();
   }
 }
