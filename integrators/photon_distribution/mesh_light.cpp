@@ -11,7 +11,6 @@
 
 #include "base/process/seconds.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
-#include "renderer/film/image_distance.h"
 #include "renderer/film/spectral_image.h"
 #include "scenes/scene/fine_bands.h"
 #include "tracing/flow_drawing/caustic.h"

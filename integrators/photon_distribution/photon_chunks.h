@@ -12,7 +12,7 @@
 #include "base/process/progress.h"
 #include "integrators/photon_distribution/photon_distribution.h"
 #include "integrators/photon_distribution/photon_sums.h"
-#include "renderer/film/plate_photon.h"
+#include "renderer/film/film.h"
 #include "renderer/lights/beam.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"

@@ -13,7 +13,7 @@
 #include "base/process/archive.h"
 #include "integrators/photon_distribution/fluence.h"
 #include "renderer/density/density.h"
-#include "renderer/film/plate_photon.h"
+#include "renderer/film/film.h"
 #include "tracing/bending/light_channel.h"
 
 namespace tensorray {

@@ -8,7 +8,6 @@
 
 #include "base/process/progress.h"
 #include "renderer/film/film.h"
-#include "renderer/film/plate_photon.h"
 #include "renderer/images/image.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"

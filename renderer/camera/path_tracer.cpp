@@ -3,19 +3,15 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <numeric>
-#include <optional>
-#include <stdexcept>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
+#include "base/process/archive.h"
 #include "base/process/seconds.h"
-#include "renderer/camera/picture_tile.h"
 
 namespace tensorray {
 namespace {
@@ -46,6 +42,46 @@ void require_valid(const Camera& camera, const PathTracerSettings& settings) {
 /// Sets the means of a pixel's bands after `samples` more of `count` samples.
 void extend_means(const BandsIn& sum, int samples, double count, double* means) {
   for (Eigen::Index band = 0; band < sum.size(); ++band) means[band] += (sum[band] - samples * means[band]) / count;
+}
+
+/// A square of the picture: a unit of the work.
+struct Tile {
+  int left, top, width, height;  ///< In the picture.
+  std::size_t light_values;      ///< Numbers of light for each pixel.
+  std::vector<PixelState> pixels = std::vector<PixelState>(static_cast<std::size_t>(width) * height);  ///< Row by row.
+  /// Means of each pixel's bands; then of red, green and blue of each layer.
+  std::vector<double> light = std::vector<double>(pixels.size() * light_values);
+  bool is_done = false;  ///< Whether it gets no more samples.
+
+  PixelState& pixel(int x, int y) { return pixels[static_cast<std::size_t>(y) * width + x]; }
+  double* light_of(int x, int y) { return &light[(static_cast<std::size_t>(y) * width + x) * light_values]; }
+
+  /// The samples of pixels that are not done.
+  int samples() const {
+    int most = 0;
+    for (const PixelState& pixel : pixels) most = std::max(most, pixel.samples);
+    return most;
+  }
+
+  /// To bytes or from them. @throw DamagedArchive if there are not so many.
+  void copy(Archive& archive) {
+    std::uint64_t done = is_done;
+    archive.copy(done);
+    archive.copy(pixels.data(), pixels.size() * sizeof pixels[0]);
+    archive.copy(light.data(), light.size() * sizeof light[0]);
+    is_done = done != 0;
+  }
+};
+
+void add_tile(const Tile& tile, SurfacePicture& picture) {
+  for (std::size_t i = 0; i < tile.pixels.size(); ++i) {
+    const int x = tile.left + static_cast<int>(i) % tile.width, y = tile.top + static_cast<int>(i) / tile.width;
+    const std::size_t index = static_cast<std::size_t>(y) * picture.radiance.width + x;
+    const double* light = &tile.light[i * tile.light_values];
+    for (Film* film : {&picture.radiance, &picture.landed, &picture.groups})
+      for (int channel = 0; channel < film->channels; ++channel) film->plane(channel)[index] = *light++;
+    picture.pixels[index] = tile.pixels[i];
+  }
 }
 
 std::string name_of(std::size_t tile) { return "tile " + std::to_string(tile); }
@@ -188,7 +224,7 @@ int Rendering::next_samples(int before) const {
 Tile Rendering::load(std::size_t number) const {
   const int left = static_cast<int>(number) % columns_ * tile_size,
             top = static_cast<int>(number) / columns_ * tile_size;
-  Tile tile(left, top, std::min(tile_size, width_ - left), std::min(tile_size, height_ - top), light_values_);
+  Tile tile{left, top, std::min(tile_size, width_ - left), std::min(tile_size, height_ - top), light_values_};
   if (const Result kept = job_.find(name_of(number))) {
     Archive archive(*kept);
     tile.copy(archive);
@@ -391,12 +427,24 @@ bool Rendering::is_precise(Tile& tile, int x, int y) const {
 
 /// The picture of the tiles as they are kept.
 SurfacePicture Rendering::picture() const {
-  SurfacePicture picture = empty_picture(width_, height_, settings_.transparent, scene_);
+  SurfacePicture picture;
+  picture.radiance = Film(width_, height_, static_cast<int>(scene_.colors.bands()));
+  if (scene_.has_traced_light()) picture.landed = Film(width_, height_, 3);
+  if (scene_.groups > 0) picture.groups = Film(width_, height_, 3 * scene_.groups);
+  picture.pixels.resize(picture.radiance.plane_size());
+  picture.transparent = settings_.transparent;
+  picture.bends = scene_.region != nullptr;
   for (std::size_t number = 0; number < tiles_; ++number) add_tile(load(number), picture);
   return picture;
 }
 
 }  // namespace
+
+float SurfacePicture::alpha(std::size_t pixel) const {
+  const PixelState& state = pixels[pixel];
+  if (!transparent && state.samples > 0) return 1;
+  return static_cast<float>(state.depth.count / std::max(1.0, 1.0 * state.samples));
+}
 
 SurfacePicture render_surfaces(const ShadedScene& scene, const Camera& camera, const PathTracerSettings& settings,
                                const RenderCallbacks& callbacks) {

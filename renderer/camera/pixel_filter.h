@@ -26,11 +26,9 @@ class PixelFilter {
   PixelFilter(PixelFilterShape shape, double radius);
   explicit PixelFilter(PixelFilterShape shape) : PixelFilter(shape, default_radius(shape)) {}
 
-  /// The density at an offset from the pixel's centre, in 1/pixel²; its integral is 1.
-  double density(const Eigen::Vector2d& offset) const { return density(offset.x()) * density(offset.y()); }
-
-  /// An offset with this density, from `u`, uniform in [0, 1)². Each component of the offset depends on the same
-  /// component of `u` only, and increases with it. Inverts the distribution to 1e-8, in about 10 ns.
+  /// An offset from the pixel's centre with the filter's density, from `u`, uniform in [0, 1)². Each component of the
+  /// offset depends on the same component of `u` only, and increases with it. Inverts the distribution to 1e-8, in
+  /// about 10 ns.
   Eigen::Vector2d sample(const Eigen::Vector2d& u) const { return {sample(u.x()), sample(u.y())}; }
 
   PixelFilterShape shape() const { return shape_; }

@@ -6,7 +6,6 @@
 #include <optional>
 #include <sstream>
 #include <stdexcept>
-#include <vector>
 
 #include <Eigen/LU>
 #include <OpenColorIO/OpenColorIO.h>
@@ -236,7 +235,7 @@ struct ColorManagement::State {
   Matrix3d xyz_to_working;
 };
 
-ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::make_unique<State>()) {
+ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::make_shared<State>()) {
   OCIO::SetLoggingFunction([](const char*) {});  // Messages that matter also come as exceptions.
   const auto [config, name] = find_config(settings.config);
   const std::string subject = "OCIO config " + name;
@@ -260,10 +259,6 @@ ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::ma
   state_->config = config;
   state_->config_name = name;
 }
-
-ColorManagement::~ColorManagement() = default;
-ColorManagement::ColorManagement(ColorManagement&&) noexcept = default;
-ColorManagement& ColorManagement::operator=(ColorManagement&&) noexcept = default;
 
 Matrix3d ColorManagement::xyz_to_working() const { return state_->xyz_to_working; }
 

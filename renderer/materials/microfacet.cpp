@@ -1,6 +1,5 @@
 #include "renderer/materials/microfacet.h"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>

@@ -1,8 +1,6 @@
 #include "renderer/shading/shading.h"
 
-#include <limits>
 #include <set>
-#include <stdexcept>
 #include <string>
 
 #include "base/errors.h"

@@ -7,7 +7,6 @@
 /// trace_bent_rays → continue_paths (stages.h), and again from shade_surface on, until no path waits. Without a
 /// BendingRegion no path waits.
 
-#include <cstdint>
 #include <limits>
 #include <memory>
 #include <optional>

@@ -1,8 +1,5 @@
 #include "renderer/surfaces/surface.h"
 
-#include <algorithm>
-#include <cmath>
-
 namespace tensorray {
 
 Eigen::Vector3f SurfaceTexture::color_at(const Eigen::Vector3d& point) const {

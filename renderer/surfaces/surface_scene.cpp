@@ -319,10 +319,6 @@ SurfaceScene::SurfaceScene(std::vector<ShadedSurface> surfaces) : state_(new Sta
   state_->build();
 }
 
-SurfaceScene::~SurfaceScene() = default;
-SurfaceScene::SurfaceScene(SurfaceScene&&) noexcept = default;
-SurfaceScene& SurfaceScene::operator=(SurfaceScene&&) noexcept = default;
-
 const std::vector<ShadedSurface>& SurfaceScene::surfaces() const { return state_->surfaces; }
 const Eigen::AlignedBox3d& SurfaceScene::bounds() const { return state_->bounds; }
 

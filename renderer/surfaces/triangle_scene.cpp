@@ -143,10 +143,6 @@ TriangleScene::TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
   state_->commit();
 }
 
-TriangleScene::~TriangleScene() = default;
-TriangleScene::TriangleScene(TriangleScene&&) noexcept = default;
-TriangleScene& TriangleScene::operator=(TriangleScene&&) noexcept = default;
-
 bool TriangleScene::empty() const { return !state_->scene; }
 
 std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,

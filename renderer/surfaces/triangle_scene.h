@@ -45,10 +45,6 @@ class TriangleScene {
   TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
                 const std::vector<std::array<std::uint32_t, 3>>& triangles, const Eigen::Vector2d& origin, double unit);
 
-  ~TriangleScene();
-  TriangleScene(TriangleScene&&) noexcept;
-  TriangleScene& operator=(TriangleScene&&) noexcept;
-
   /// Whether the scene has no triangles.
   bool empty() const;
 
@@ -67,7 +63,7 @@ class TriangleScene {
 
  private:
   struct State;
-  std::unique_ptr<State> state_;
+  std::shared_ptr<State> state_;
 };
 
 }  // namespace tensorray

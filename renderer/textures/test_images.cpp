@@ -220,20 +220,8 @@ void draw_line(Image& image) {
 Image test_image(TestImage which, int width, int height) {
   if (width < 1 || height < 1) throw std::invalid_argument("a test picture must be at least one pixel wide and high");
   Image image(width, height, {"R", "G", "B"});
-  switch (which) {
-    case TestImage::checkerboard:
-      draw_checkerboard(image);
-      break;
-    case TestImage::grid:
-      draw_grid(image);
-      break;
-    case TestImage::color_wheel:
-      draw_color_wheel(image);
-      break;
-    case TestImage::line:
-      draw_line(image);
-      break;
-  }
+  constexpr std::array<void (*)(Image&), 4> draw{draw_checkerboard, draw_grid, draw_color_wheel, draw_line};
+  draw[static_cast<std::size_t>(which)](image);
   return image;
 }
 
