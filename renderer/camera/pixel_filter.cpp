@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "base/constants.h"
 
@@ -47,11 +45,7 @@ struct BlackmanHarris {
 
 }  // namespace
 
-double default_radius(PixelFilterShape shape) { return shape == PixelFilterShape::box ? 0.5 : 1.5; }
-
-PixelFilter::PixelFilter(PixelFilterShape shape, double radius) : shape_(shape), radius_(radius) {
-  if (!(radius > 0 && std::isfinite(radius)))
-    throw std::invalid_argument("the pixel filter's radius must be above 0, not " + std::to_string(radius));
+PixelFilter::PixelFilter(PixelFilterShape shape) : shape_(shape), radius_(shape == PixelFilterShape::box ? 0.5 : 1.5) {
   if (shape == PixelFilterShape::box) return;
   middle_ = quantiles(0.5);
   end_ = quantiles(0.5 * searched_steps / steps);

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "renderer/shading/stages.h"
+#include "renderer/shading/wavefront.h"
 
 namespace tensorray {
 namespace {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "renderer/shading/stages.h"
+#include "renderer/shading/wavefront.h"
 
 namespace tensorray {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "base/errors.h"
-#include "renderer/shading/stages.h"
+#include "renderer/shading/wavefront.h"
 
 namespace tensorray {
 namespace {

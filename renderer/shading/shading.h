@@ -4,7 +4,7 @@
 ///
 /// The stages stand in files of their own, as free functions of the batch and of a path (wavefront.h):
 /// find_surfaces (shading.cpp) → shade_surface: add_traced_light, sample_direct_light, scatter → wait_at_region →
-/// trace_bent_rays → continue_paths (stages.h), and again from shade_surface on, until no path waits. Without a
+/// trace_bent_rays → continue_paths, and again from shade_surface on, until no path waits. Without a
 /// BendingRegion no path waits.
 
 #include <limits>

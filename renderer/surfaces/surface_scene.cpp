@@ -158,6 +158,28 @@ Vector3d tangent(const RoundCurves& curves, std::uint32_t point, const Vector3d&
   return mean.squaredNorm() > 0.01 ? Vector3d(mean.normalized()) : axis;
 }
 
+/// The colour at a point of the surface.
+Vector3f color_at(const SurfaceTexture& texture, const Vector3d& point) {
+  const Plate& plate = texture.plate;
+  const Eigen::Vector2i last = plate.resolution.array() - 1;
+  const auto pixel = [&](const Eigen::Vector2i& at) -> const Vector3f& {
+    const Eigen::Vector2i inside = at.cwiseMax(0).cwiseMin(last);
+    return texture.colors[static_cast<std::size_t>(inside.y()) * static_cast<std::size_t>(last.x() + 1) +
+                          static_cast<std::size_t>(inside.x())];
+  };
+  // Far beyond the edges all colours are those of the edge, and integers do not overflow.
+  const Eigen::Vector2d at =
+      plate.to_pixel(point).cwiseMax(-1.0).cwiseMin(last.cast<double>().array().matrix() + Eigen::Vector2d(2, 2));
+  if (!texture.smooth) return pixel(at.array().floor().cast<int>());
+  const Eigen::Array2d corner = (at.array() - 0.5).floor();
+  const Eigen::Array2f part = (at.array() - 0.5 - corner).cast<float>();
+  const Eigen::Vector2i first = corner.cast<int>();
+  const auto row = [&](int y) -> Vector3f {
+    return (1 - part.x()) * pixel(first + Eigen::Vector2i(0, y)) + part.x() * pixel(first + Eigen::Vector2i(1, y));
+  };
+  return (1 - part.y()) * row(0) + part.y() * row(1);
+}
+
 }  // namespace
 
 struct SurfaceScene::State {
@@ -349,7 +371,7 @@ std::optional<SurfaceHit> SurfaceScene::State::found(const StraightRay& ray, con
     complete(std::get<RoundCurves>(surface.shape), hit);
   }
   hit.distance = (hit.position - ray.origin).dot(ray.direction);
-  if (surface.texture) hit.color = surface.texture->color_at(hit.position);
+  if (surface.texture) hit.color = color_at(*surface.texture, hit.position);
   return found;
 }
 

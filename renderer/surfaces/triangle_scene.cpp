@@ -143,11 +143,9 @@ TriangleScene::TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
   state_->commit();
 }
 
-bool TriangleScene::empty() const { return !state_->scene; }
-
 std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
                                                   double min_distance, double max_distance) const {
-  if (empty()) return std::nullopt;
+  if (!state_->scene) return std::nullopt;
   if (state_->is_far(from + min_distance * direction)) {
     const auto way = entry(state_->box, from, direction);
     if (!way || *way > max_distance) return std::nullopt;
@@ -162,7 +160,7 @@ std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, c
 void TriangleScene::along(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
                           std::vector<TriangleId>& candidates) const {
   candidates.clear();
-  if (empty()) return;
+  if (!state_->scene) return;
   double start = -1e-5 * state_->unit;  // Triangles at the start must not be lost.
   if (state_->is_far(from)) {
     const auto way = entry(state_->box, from, direction);
@@ -179,7 +177,7 @@ void TriangleScene::along(const Eigen::Vector3d& from, const Eigen::Vector3d& di
 
 void TriangleScene::near(const Eigen::Vector3d& point, double radius, std::vector<TriangleId>& candidates) const {
   candidates.clear();
-  if (empty()) return;
+  if (!state_->scene) return;
   RTCPointQuery query{};
   query.x = state_->local(point.x(), 0);
   query.y = state_->local(point.y(), 1);
