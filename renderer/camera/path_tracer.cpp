@@ -86,7 +86,6 @@ void add_tile(const Tile& tile, SurfacePicture& picture) {
 
 std::string name_of(std::size_t tile) { return "tile " + std::to_string(tile); }
 
-/// Numbers of tiles.
 struct TileLists {
   std::vector<std::size_t> part;              ///< Those of this run.
   std::vector<std::size_t> wanted;            ///< Of them, those that this rank renders, and that are not done.
@@ -207,7 +206,6 @@ bool Rendering::is_of_rank(std::size_t place) const {
 
 bool Rendering::is_round_over() const { return job_.ranks && seconds_since(lists_.gathered) > round_seconds; }
 
-/// The fraction of the time that is used up.
 double Rendering::time_used() const {
   return std::isinf(settings_.max_seconds) ? 0 : seconds_since(start_) / std::max(settings_.max_seconds, 1e-300);
 }
@@ -308,7 +306,6 @@ bool Rendering::extend(std::size_t number, Batch& batch) {
   return tile.is_done;
 }
 
-/// Adds the ray of a sample of pixel x, y of the picture.
 void Rendering::add_ray(int x, int y, int sample, Batch& batch) const {
   PathSampler sampler(settings_.seed, static_cast<std::size_t>(y) * width_ + x, static_cast<std::uint32_t>(sample));
   const Vector2d offset = settings_.filter.sample(sampler.in_pixel());
@@ -351,7 +348,6 @@ void Rendering::add_sample(PixelState& pixel, std::size_t number, Batch& batch) 
   if (view.surface) add_surface(pixel, batch.offsets[number], *view.surface);
 }
 
-/// Adds the light of a pixel's `samples` to the tile.
 void Rendering::add_light(Tile& tile, int x, int y, int samples, Batch& batch) const {
   const int count = tile.pixel(x, y).samples;
   double* light = tile.light_of(x, y);
@@ -425,7 +421,6 @@ bool Rendering::is_precise(Tile& tile, int x, int y) const {
   return precise(variance / count, luminance / count);
 }
 
-/// The picture of the tiles as they are kept.
 SurfacePicture Rendering::picture() const {
   SurfacePicture picture;
   picture.radiance = Film(width_, height_, static_cast<int>(scene_.colors.bands()));

@@ -112,7 +112,6 @@ bool is_wide(double low, double high) {
   return high - low > 1e-12 * std::max(std::abs(low), std::abs(high)) && std::isfinite(1 / (high - low));
 }
 
-/// A range around a single value.
 ValueRange range_about(double value, bool logarithmic) {
   if (logarithmic) return {value / 2, 2 * value, true};
   const double margin = std::abs(value) / 2;

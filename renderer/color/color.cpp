@@ -30,7 +30,6 @@ Vector3d white_d65() { return xyz_of(d65_white()); }
 /// From ACES2065-1 (SMPTE ST 2065-1) to XYZ. The blue primary has a negative y.
 Matrix3d aces_to_xyz() { return rgb_to_xyz({{0.7347, 0.2653}, {0, 1}, {0.0001, -0.0770}, aces_white()}); }
 
-/// A config and its name for messages and provenance.
 struct NamedConfig {
   OCIO::ConstConfigRcPtr config;
   std::string name;

@@ -135,7 +135,6 @@ void turn_round(TriangleMesh& mesh) {
 
 constexpr double angle_rounding = 1e-6;  // Of the cosine of an angle between triangles, so that 90° smooths a cube.
 
-/// A corner of a triangle.
 struct TriangleCorner {
   std::uint32_t triangle = 0;
   int number = 0;

@@ -7,7 +7,6 @@
 /// trace_bent_rays → continue_paths, and again from shade_surface on, until no path waits. Without a
 /// BendingRegion no path waits.
 
-#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -57,8 +56,6 @@ struct ShadingSettings {
   /// The angle of a pixel as the camera sees it, radians. Bent rays of the camera may be off by a fifth of it, so that
   /// rays of some bands are interpolated between those of others. 0: the ray of each band is traced.
   double pixel_angle = 0;
-  /// World units; beyond it nothing hides the sky.
-  double occlusion_distance = std::numeric_limits<double>::infinity();
 };
 
 /// The scene to draw. It refers to its parts, which must outlive it.

@@ -201,7 +201,7 @@ void trace_bent_rays(Wavefront& front);
 /// Brings the light that was sought, and continues the other paths, as a path for each bent ray.
 void continue_paths(Wavefront& front, PathState& path);
 
-// found_light.cpp: what a path has found is added to the radiance of its camera's ray.
+// direct_light.cpp: what a path has found is added to the radiance of its camera's ray.
 
 /// Where light comes from: a light, or the background in a direction.
 struct LightSource {

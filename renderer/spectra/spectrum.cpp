@@ -92,7 +92,6 @@ void check_range(double min, double max, int count) {
                                 text(count));
 }
 
-/// Scales so that power and Y sum to 1.
 void normalize(std::vector<Band>& bands, const std::string& range) {
   Amount sum;
   for (const Band& band : bands) {

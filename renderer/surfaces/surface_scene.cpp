@@ -158,7 +158,6 @@ Vector3d tangent(const RoundCurves& curves, std::uint32_t point, const Vector3d&
   return mean.squaredNorm() > 0.01 ? Vector3d(mean.normalized()) : axis;
 }
 
-/// The colour at a point of the surface.
 Vector3f color_at(const SurfaceTexture& texture, const Vector3d& point) {
   const Plate& plate = texture.plate;
   const Eigen::Vector2i last = plate.resolution.array() - 1;

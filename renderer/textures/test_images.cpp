@@ -21,7 +21,6 @@ constexpr int cells_across = 16;  // Number of cells along the shorter side.
 
 double cell_size(const Image& image) { return std::min(image.width, image.height) / static_cast<double>(cells_across); }
 
-/// Sets each pixel (x, y) to `color(x, y)`.
 template <class Color>
 void fill(Image& image, const Color& color) {
   tbb::parallel_for(0, image.height, [&](int y) {

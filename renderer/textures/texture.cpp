@@ -223,19 +223,22 @@ struct Texture::State {
   State(NativeImage image, ColorConversion conversion, Wrap wrap_)
       : pyramid(std::move(image), std::move(conversion)), wrap(wrap_) {}
 
-  Vector4f mean(const Vector2d& st) const;
-  Vector4f probe(const Vector2d& st, LevelChoice choice) const;
+  /// The mean of the picture, or transparent black outside a picture that does not continue beyond its edges.
+  Vector4f mean(const Vector2d& st) const {
+    const bool outside = (st.array() < 0).any() || (st.array() > 1).any();
+    return outside && wrap == Wrap::none ? Vector4f::Zero() : pyramid.mean();
+  }
+
+  Vector4f probe(const Vector2d& st, LevelChoice choice) const {
+    const Vector2d place(bring_near(st.x(), wrap), bring_near(1 - st.y(), wrap));
+    Vector4f result = interpolate(pyramid, choice.level, place, wrap);
+    if (choice.blend > 0) result += choice.blend * (interpolate(pyramid, choice.level + 1, place, wrap) - result);
+    return result;
+  }
 
   ImagePyramid pyramid;
   Wrap wrap;
 };
-
-Vector4f Texture::State::probe(const Vector2d& st, LevelChoice choice) const {
-  const Vector2d place(bring_near(st.x(), wrap), bring_near(1 - st.y(), wrap));
-  Vector4f result = interpolate(pyramid, choice.level, place, wrap);
-  if (choice.blend > 0) result += choice.blend * (interpolate(pyramid, choice.level + 1, place, wrap) - result);
-  return result;
-}
 
 Texture::Texture(Image image, Wrap wrap)
     : state_(std::make_shared<State>(native_image(std::move(image)), ColorConversion(), wrap)) {}
@@ -251,12 +254,6 @@ Texture::Texture(const std::filesystem::path& file, const ColorManagement& color
 
 int Texture::width() const { return state_->pyramid.width(0); }
 int Texture::height() const { return state_->pyramid.height(0); }
-
-/// The mean of the picture, or transparent black outside a picture that does not continue beyond its edges.
-Vector4f Texture::State::mean(const Vector2d& st) const {
-  const bool outside = (st.array() < 0).any() || (st.array() > 1).any();
-  return outside && wrap == Wrap::none ? Vector4f::Zero() : pyramid.mean();
-}
 
 /// Probes lie along the longer axis, at distances of at most the length of the shorter axis. Each probe is a bilinear
 /// tent in the level whose texels are as large as the shorter axis. Together the probes form a box as long as the
