@@ -10,7 +10,6 @@
 #include "base/process/seconds.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
 #include "integrators/photon_distribution/plate_light.h"
-#include "renderer/film/image_distance.h"
 #include "renderer/film/spectral_image.h"
 #include "scenes/scene/fine_bands.h"
 #include "tracing/flow_drawing/caustic.h"

@@ -17,7 +17,7 @@
 #include "integrators/photon_distribution/fluence.h"
 #include "integrators/photon_distribution/photon_distribution.h"
 #include "renderer/density/density.h"
-#include "renderer/film/plate_photon.h"
+#include "renderer/film/film.h"
 #include "renderer/lights/beam.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"

@@ -9,7 +9,7 @@
 #include "base/process/job.h"
 #include "base/process/progress.h"
 #include "renderer/density/density.h"
-#include "renderer/film/plate_photon.h"
+#include "renderer/film/film.h"
 #include "renderer/lights/beam.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"

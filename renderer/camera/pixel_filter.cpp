@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "base/constants.h"
 
@@ -47,11 +45,8 @@ struct BlackmanHarris {
 
 }  // namespace
 
-double default_radius(PixelFilterShape shape) { return shape == PixelFilterShape::box ? 0.5 : 1.5; }
-
-PixelFilter::PixelFilter(PixelFilterShape shape, double radius) : shape_(shape), radius_(radius) {
-  if (!(radius > 0 && std::isfinite(radius)))
-    throw std::invalid_argument("the pixel filter's radius must be above 0, not " + std::to_string(radius));
+PixelFilter::PixelFilter(PixelFilterShape shape) : shape_(shape), radius_(shape == PixelFilterShape::box ? 0.5 : 1.5) {
+  if (shape == PixelFilterShape::box) return;
   middle_ = quantiles(0.5);
   end_ = quantiles(0.5 * searched_steps / steps);
 }
@@ -66,31 +61,15 @@ std::vector<PixelFilter::Quantile> PixelFilter::quantiles(double last) const {
   return result;
 }
 
+/// Not of the box, as `cumulative`.
 double PixelFilter::density(double x) const {
   const double t = x / radius_;
-  if (std::abs(t) > 1) return 0;
-  switch (shape_) {
-    case PixelFilterShape::gaussian:
-      return Gaussian::density(t) / radius_;
-    case PixelFilterShape::blackman_harris:
-      return BlackmanHarris::density(t) / radius_;
-    case PixelFilterShape::box:
-      break;
-  }
-  return 0.5 / radius_;
+  return (shape_ == PixelFilterShape::gaussian ? Gaussian::density(t) : BlackmanHarris::density(t)) / radius_;
 }
 
 double PixelFilter::cumulative(double x) const {
   const double t = x / radius_;
-  switch (shape_) {
-    case PixelFilterShape::gaussian:
-      return Gaussian::cumulative(t);
-    case PixelFilterShape::blackman_harris:
-      return BlackmanHarris::cumulative(t);
-    case PixelFilterShape::box:
-      break;
-  }
-  return 0.5 + t / 2;
+  return shape_ == PixelFilterShape::gaussian ? Gaussian::cumulative(t) : BlackmanHarris::cumulative(t);
 }
 
 double PixelFilter::sample(double u) const {

@@ -14,27 +14,17 @@ enum class PixelFilterShape {
   blackman_harris,  ///< Four cosine terms; side lobes of −92 dB: smooth, with almost no aliasing.
 };
 
-/// The usual radius of the shape, in pixels: box ½, others 1.5.
-double default_radius(PixelFilterShape shape);
-
-/// A positive, separable filter on [−radius, radius]², for filter importance sampling: the filter is the density of the
-/// samples' positions, and all samples of a pixel have weight 1. Immutable: any thread may use it.
+/// A positive, separable filter on [−radius, radius]² (of the box ½ pixel, of others 1.5), for filter importance
+/// sampling: the filter is the density of the samples' positions, and all samples of a pixel have weight 1. Immutable:
+/// any thread may use it.
 class PixelFilter {
  public:
-  /// @param radius  Pixels.
-  /// @throw std::invalid_argument unless the radius is > 0 and finite.
-  PixelFilter(PixelFilterShape shape, double radius);
-  explicit PixelFilter(PixelFilterShape shape) : PixelFilter(shape, default_radius(shape)) {}
+  explicit PixelFilter(PixelFilterShape shape);
 
-  /// The density at an offset from the pixel's centre, in 1/pixel²; its integral is 1.
-  double density(const Eigen::Vector2d& offset) const { return density(offset.x()) * density(offset.y()); }
-
-  /// An offset with this density, from `u`, uniform in [0, 1)². Each component of the offset depends on the same
-  /// component of `u` only, and increases with it. Inverts the distribution to 1e-8, in about 10 ns.
+  /// An offset from the pixel's centre with the filter's density, from `u`, uniform in [0, 1)². Each component of the
+  /// offset depends on the same component of `u` only, and increases with it. Inverts the distribution to 1e-8, in
+  /// about 10 ns.
   Eigen::Vector2d sample(const Eigen::Vector2d& u) const { return {sample(u.x()), sample(u.y())}; }
-
-  PixelFilterShape shape() const { return shape_; }
-  double radius() const { return radius_; }
 
  private:
   double density(double x) const;

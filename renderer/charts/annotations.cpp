@@ -33,7 +33,6 @@ struct Sizes {
         margin(std::round(letter)) {}
 };
 
-/// A text or a line of a drawing.
 struct Mark {
   Vector2d from, to;  // Ends of a line; of a text, `from` is its lower left corner.
   std::string text;   // Empty: a line.

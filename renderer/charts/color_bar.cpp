@@ -17,8 +17,6 @@ namespace {
 
 using Box = Eigen::AlignedBox2d;  // In pixels from the upper left corner, continuous.
 
-// --- Scales
-
 /// Tolerance at the ends of the range, as a fraction of a step: a tick this close outside is still in the range.
 constexpr double rounding = 1e-9;
 
@@ -74,9 +72,6 @@ std::vector<Tick> logarithmic_ticks(const ValueRange& range, int most) {
   return ticks.size() < 2 || ticks.size() > few ? linear_ticks(range, most) : ticks;
 }
 
-// --- Drawing
-
-/// Draws a frame around a box.
 void frame(Image& image, const Box& box, double width, const Eigen::Vector3d& color) {
   const Eigen::Vector2d a = box.min(), b = box.max();
   const Eigen::Vector2d w(width, width);
@@ -101,7 +96,6 @@ struct Layout {
   double swatch() const { return std::round(1.5 * letter); }  ///< Width of the colour bar and of the squares of a key.
 };
 
-/// The place of a legend, and the colour of its text.
 struct Panel {
   Box inside;  ///< The panel without padding; its corners lie on whole pixels.
   Eigen::Vector3d ink;

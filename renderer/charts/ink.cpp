@@ -1,6 +1,5 @@
 #include "renderer/charts/ink.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 

@@ -4,9 +4,7 @@ namespace tensorray {
 
 const char* const builtin_color_config = R"(ocio_profile_version: 2
 
-environment:
-  {}
-search_path: ""
+environment: {}
 strictparsing: true
 luma: [0.2126, 0.7152, 0.0722]
 name: tensorray
@@ -33,9 +31,6 @@ displays:
     - !<Views> [Un-tone-mapped, Soft highlights, ACES SDR, Raw]
   Rec.1886:
     - !<Views> [Un-tone-mapped, Soft highlights, ACES SDR, Raw]
-
-active_displays: []
-active_views: []
 
 default_view_transform: Un-tone-mapped
 
@@ -66,74 +61,38 @@ view_transforms:
     from_scene_reference: !<BuiltinTransform> {style: ACES-OUTPUT - ACES2065-1_to_CIE-XYZ-D65 - SDR-VIDEO_1.0}
 
 display_colorspaces:
-  - !<ColorSpace>
-    name: CIE-XYZ-D65
-    bitdepth: 32f
-    description: CIE XYZ relative to D65; the display-referred reference.
-    isdata: false
-    allocation: uniform
-
+  - !<ColorSpace> {name: CIE-XYZ-D65, description: CIE XYZ relative to D65; the display-referred reference.}
   - !<ColorSpace>
     name: sRGB
-    bitdepth: 32f
     description: IEC 61966-2-1.
-    isdata: false
-    allocation: uniform
     from_display_reference: !<BuiltinTransform> {style: DISPLAY - CIE-XYZ-D65_to_sRGB}
-
   - !<ColorSpace>
     name: Rec.1886
-    bitdepth: 32f
     description: Rec.709 primaries with the Rec.1886 curve (gamma 2.4).
-    isdata: false
-    allocation: uniform
     from_display_reference: !<BuiltinTransform> {style: DISPLAY - CIE-XYZ-D65_to_REC.1886-REC.709}
 
 colorspaces:
-  - !<ColorSpace>
-    name: ACES2065-1
-    bitdepth: 32f
-    description: Linear AP0 primaries; the scene-referred reference.
-    isdata: false
-    allocation: uniform
-
+  - !<ColorSpace> {name: ACES2065-1, description: Linear AP0 primaries; the scene-referred reference.}
   - !<ColorSpace>
     name: ACEScg
-    bitdepth: 32f
     description: Linear AP1 primaries.
-    isdata: false
-    allocation: uniform
     to_scene_reference: !<BuiltinTransform> {style: ACEScg_to_ACES2065-1}
-
   - !<ColorSpace>
     name: lin_rec709
-    bitdepth: 32f
     description: Linear Rec.709 primaries, white D65.
-    isdata: false
-    allocation: uniform
     from_scene_reference: !<GroupTransform>
       children:
         - !<BuiltinTransform> {style: ACEScg_to_ACES2065-1, direction: inverse}
         - !<BuiltinTransform> {style: UTILITY - ACES-AP1_to_LINEAR-REC709_BFD}
-
   - !<ColorSpace>
     name: srgb_texture
-    bitdepth: 32f
     description: Pictures as most files hold them, Rec.709 primaries under the curve of IEC 61966-2-1.
-    isdata: false
-    allocation: uniform
     to_scene_reference: !<GroupTransform>
       children:
         - !<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055}
         - !<BuiltinTransform> {style: UTILITY - ACES-AP1_to_LINEAR-REC709_BFD, direction: inverse}
         - !<BuiltinTransform> {style: ACEScg_to_ACES2065-1}
-
-  - !<ColorSpace>
-    name: Raw
-    bitdepth: 32f
-    description: Data that is not colour.
-    isdata: true
-    allocation: uniform
+  - !<ColorSpace> {name: Raw, description: Data that is not colour., isdata: true}
 )";
 
 }  // namespace tensorray

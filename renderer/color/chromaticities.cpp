@@ -9,6 +9,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+Vector2d chromaticity_of(const Vector3d& xyz) { return xyz.head<2>() / xyz.sum(); }
+
 Matrix3d bradford_cones() {
   Matrix3d cones;
   cones << 0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296;
@@ -26,8 +28,6 @@ std::array<double, 8> numbers_of(const Chromaticities& c) {
 }
 
 Vector3d xyz_of(const Vector2d& c) { return {c.x() / c.y(), 1, (1 - c.x() - c.y()) / c.y()}; }
-
-Vector2d chromaticity_of(const Vector3d& xyz) { return xyz.head<2>() / xyz.sum(); }
 
 Matrix3d rgb_to_xyz(const Chromaticities& colors) {
   Matrix3d primaries;  // X, Y and Z of each in proportion: y may be 0.

@@ -24,7 +24,6 @@ inline Chromaticities rec709_chromaticities() { return {{0.64, 0.33}, {0.30, 0.6
 
 /// XYZ with Y = 1.
 Eigen::Vector3d xyz_of(const Eigen::Vector2d& chromaticity);
-Eigen::Vector2d chromaticity_of(const Eigen::Vector3d& xyz);
 
 /// From linear RGB to XYZ; RGB (1, 1, 1) becomes the white with Y = 1.
 Eigen::Matrix3d rgb_to_xyz(const Chromaticities& colors);

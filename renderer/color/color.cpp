@@ -6,7 +6,6 @@
 #include <optional>
 #include <sstream>
 #include <stdexcept>
-#include <vector>
 
 #include <Eigen/LU>
 #include <OpenColorIO/OpenColorIO.h>
@@ -31,7 +30,6 @@ Vector3d white_d65() { return xyz_of(d65_white()); }
 /// From ACES2065-1 (SMPTE ST 2065-1) to XYZ. The blue primary has a negative y.
 Matrix3d aces_to_xyz() { return rgb_to_xyz({{0.7347, 0.2653}, {0, 1}, {0.0001, -0.0770}, aces_white()}); }
 
-/// A config and its name for messages and provenance.
 struct NamedConfig {
   OCIO::ConstConfigRcPtr config;
   std::string name;
@@ -236,7 +234,7 @@ struct ColorManagement::State {
   Matrix3d xyz_to_working;
 };
 
-ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::make_unique<State>()) {
+ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::make_shared<State>()) {
   OCIO::SetLoggingFunction([](const char*) {});  // Messages that matter also come as exceptions.
   const auto [config, name] = find_config(settings.config);
   const std::string subject = "OCIO config " + name;
@@ -260,10 +258,6 @@ ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::ma
   state_->config = config;
   state_->config_name = name;
 }
-
-ColorManagement::~ColorManagement() = default;
-ColorManagement::ColorManagement(ColorManagement&&) noexcept = default;
-ColorManagement& ColorManagement::operator=(ColorManagement&&) noexcept = default;
 
 Matrix3d ColorManagement::xyz_to_working() const { return state_->xyz_to_working; }
 

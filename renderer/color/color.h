@@ -54,9 +54,6 @@ class ColorManagement {
   /// @throw std::runtime_error naming the config and the fix if it is unreadable or not valid, has no scene_linear role
   /// or one that is not linear, or does not have the display or view (the message lists the known ones).
   explicit ColorManagement(const ColorSettings& settings);
-  ~ColorManagement();
-  ColorManagement(ColorManagement&&) noexcept;
-  ColorManagement& operator=(ColorManagement&&) noexcept;
 
   /// The 3x3 matrix from XYZ to the working space (role `scene_linear`). XYZ is relative to D65: the XYZ of the D65
   /// white (Y = 1) becomes the working space's white (1, 1, 1). The working space is found by the config's role
@@ -108,7 +105,7 @@ class ColorManagement {
 
  private:
   struct State;
-  std::unique_ptr<State> state_;
+  std::shared_ptr<State> state_;
 };
 
 }  // namespace tensorray

@@ -45,7 +45,6 @@ ColorConversion curve_and_matrix(const TransferCurve& curve, const Matrix3d& mat
   };
 }
 
-/// Whether the primaries are those of XYZ.
 bool is_xyz(const Chromaticities& c) {
   return (c.red - Vector2d(1, 0)).norm() + (c.green - Vector2d(0, 1)).norm() + c.blue.norm() < 1e-4;
 }

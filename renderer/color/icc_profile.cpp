@@ -16,7 +16,6 @@ using Eigen::Vector3d;
 
 const Vector3d profile_white(0.9642, 1, 0.8249);  // D50, as the format rounds it.
 
-/// Frees what the library has made.
 struct FreeIcc {
   void operator()(void* profile) const { cmsCloseProfile(profile); }
   void operator()(cmsToneCurve* curve) const { cmsFreeToneCurve(curve); }

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
-#include <utility>
 
 namespace tensorray {
 namespace {
@@ -141,7 +140,6 @@ void AreaDeposit::read_row(const std::vector<const AreaDeposit*>& deposits, int 
   }
 }
 
-/// Adds the integers of `covered` less those of `before`.
 void AreaDeposit::add_difference(int x, int y, double covered, double before) {
   std::uint64_t* const sums = &sums_[place(x, y)];
   for (std::size_t k = 0; k < plane_weights_.size(); ++k)

@@ -1,4 +1,4 @@
-#include "renderer/coverage/edge_deposit.h"
+#include "renderer/coverage/area_deposit.h"
 
 // The code before HWY_AFTER_NAMESPACE is compiled once for each kind of processor. It calls no inline functions of
 // other headers: the linker would keep only one of their copies, which may be compiled for the wrong processor.

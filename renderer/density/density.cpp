@@ -95,7 +95,6 @@ std::vector<double> half_filter(double tau) {
   return filter;
 }
 
-/// Adds factor × (a + b) to `sum`.
 void add_pair(double factor, const double* a, const double* b, int count, double* sum) {
   for (int i = 0; i < count; ++i) sum[i] += factor * (a[i] + b[i]);
 }

@@ -3,7 +3,6 @@
 /// Density estimation: computes power per pixel from photons on a plate.
 
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/film/spectral_image.h
-/// Conversion of the light on a film to RGB and spectral pictures.
+/// Conversion of the light on a film to RGB and spectral pictures; how far two pictures are apart.
 
 #include <vector>
 
@@ -42,5 +42,10 @@ struct SpectralImage {
 /// @throw std::invalid_argument unless the film has one channel per band.
 SpectralImage spectral_image(const Film& film, const std::vector<Band>& bands, SpectralQuantity quantity, double beam,
                              const Eigen::Matrix3d& xyz_to_rgb);
+
+/// The root of the sum of squared differences, as a part of that of `exact`, in the first three channels (the colours)
+/// or as many as there are; 0 if `exact` is black.
+/// @throw std::invalid_argument if the pictures differ in size or in their number of colours.
+double relative_distance(const Image& image, const Image& exact);
 
 }  // namespace tensorray

@@ -48,8 +48,9 @@ struct PictureFormat {
 };
 
 /// Everything that the program does with OpenImageIO (renderer/openimageio). It is a library of its own, which is
-/// loaded when the first picture is read, or written as JPEG or TIFF: Debian's OpenImageIO brings 260 libraries, which
-/// take a quarter of a second to load, and several seconds from a cold disk. Most renders do not wait for them.
+/// loaded from the folder of the program when the first picture is read, or written as JPEG or TIFF: Debian's
+/// OpenImageIO brings 260 libraries, which take a quarter of a second to load, and several seconds from a cold disk.
+/// Most renders do not wait for them.
 struct ImagePlugin {
   void (*set_threads)(int threads);
   /// JPEG and TIFF.
@@ -57,10 +58,6 @@ struct ImagePlugin {
   Image (*decode)(const std::filesystem::path& path);
   NativeImage (*decode_native)(const std::filesystem::path& path, const std::string& layer);
 };
-
-/// The library, loaded at the first call, from the folder of the program. Any thread may call it.
-/// @throw std::runtime_error if it cannot be loaded.
-const ImagePlugin& image_plugin();
 
 inline std::size_t bytes_of(SampleType type) {
   return type == SampleType::uint8 ? 1 : type == SampleType::uint16 ? 2 : 4;

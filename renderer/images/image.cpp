@@ -6,14 +6,12 @@
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
-#include <iterator>
-#include <memory>
 #include <mutex>
 #include <new>
-#include <optional>
-#include <set>
 #include <stdexcept>
 #include <system_error>
+
+#include <dlfcn.h>
 
 #include "base/errors.h"
 #include "base/text/text.h"
@@ -79,6 +77,25 @@ bool is_cut_off_jpeg(const std::filesystem::path& path) {
   // start of the last scan belongs to the picture itself, not to an embedded one.
   const std::size_t scan = bytes.rfind("\xFF\xDA");
   return scan == std::string::npos || bytes.find("\xFF\xD9", scan) == std::string::npos;
+}
+
+/// The run path of the program, which `dlopen` searches, is its own folder (CMAKE_BUILD_RPATH).
+const ImagePlugin& load_plugin() {
+  constexpr const char* file = "libtensorray_pictures.so";
+#ifdef TENSORRAY_LOADED_FIRST
+  dlopen(TENSORRAY_LOADED_FIRST, RTLD_LAZY | RTLD_LOCAL);  // For speed (CMakeLists.txt); without it all works, too.
+#endif
+  void* const library = dlopen(file, RTLD_LAZY | RTLD_LOCAL);
+  void* const functions = library ? dlsym(library, "tensorray_image_plugin") : nullptr;
+  if (!functions)
+    throw std::runtime_error(std::string("cannot load ") + file + ", which must be beside the program: " + dlerror());
+  return *static_cast<const ImagePlugin*>(functions);
+}
+
+/// The library, loaded at the first call. @throw std::runtime_error if it cannot be loaded.
+const ImagePlugin& image_plugin() {
+  static const ImagePlugin& library = load_plugin();
+  return library;
 }
 
 int image_threads = 0;  ///< 0: all.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <stdexcept>
 #include <utility>
 
 #include "base/process/job.h"
@@ -19,7 +18,6 @@ constexpr std::uint64_t photon_seed = 0x9e3779b97f4a7c15;  // Photons do not sha
 constexpr std::size_t chunk_size = 128;                    // Positions.
 constexpr std::size_t chunks_in_round = 256;               // That ranks give each other: 100 MB, of 32 bands.
 
-/// A light that emits photons.
 struct Source {
   int light = 0;
   PhotonEmitter emitter;
@@ -27,7 +25,6 @@ struct Source {
   std::uint64_t count = 1;                       // Positions in each pass.
 };
 
-/// Positions of one source.
 struct Chunk {
   std::size_t source = 0;
   std::uint64_t first = 0, last = 0;
@@ -96,7 +93,6 @@ void add_mirrored(const Photon& photon, const Plate& plate, double radius, std::
   photons.insert(photons.end(), images.begin(), images.end());
 }
 
-/// Traces the photons of a pass.
 class PhotonTracer {
  public:
   PhotonTracer(const BendingRegion& region, const SurfaceScene& surfaces, const PhotonTracerSettings& settings,
@@ -107,12 +103,61 @@ class PhotonTracer {
         pass_(pass),
         radius_(photon_radius(settings.radius, pass)) {}
 
-  ChunkPhotons trace(const Source& source, const Chunk& chunk) const;
+  ChunkPhotons trace(const Source& source, const Chunk& chunk) const {
+    ChunkPhotons result;
+    const std::uint64_t stream = static_cast<std::uint64_t>(source.light) * settings_.passes + pass_;
+    for (std::uint64_t i = chunk.first; i < chunk.last; ++i)
+      trace(source, {settings_.seed ^ photon_seed, stream, static_cast<std::uint32_t>(i), 0}, result);
+    return result;
+  }
+
   double radius() const { return radius_; }
 
  private:
-  void trace(const Source& source, PathSampler sampler, ChunkPhotons& result) const;
-  PhotonEnd land(const Source& source, const BentRay& ray, const EmittedPhoton& emitted, ChunkPhotons& result) const;
+  void trace(const Source& source, PathSampler sampler, ChunkPhotons& result) const {
+    BentRay ray;
+    ray.place = sampler.next_1d();
+    const EmittedPhoton photon = source.emitter.sample(sampler);
+    ray.position = photon.origin;
+    ray.direction = photon.direction;
+    std::vector<BentRay> rays;
+    for (std::size_t band = 0; band < source.strength->size(); ++band) {
+      ray.band = static_cast<int>(band);
+      if ((*source.strength)[band] > 0) rays.push_back(ray);
+    }
+    const auto hit = surfaces_.intersect(photon.origin, photon.direction);
+    const double entry = region_.entry(photon.origin, photon.direction);
+    const bool enters = entry < (hit ? hit->distance : std::numeric_limits<double>::infinity());
+    if (!enters || !(photon.power > 0)) {  // Without power it is from the side of an area light that does not emit.
+      const PhotonEnd end = hit && !enters ? PhotonEnd::before : PhotonEnd::escaped;
+      result.counts[static_cast<std::size_t>(end)] += rays.size();
+      return;
+    }
+    region_.trace_importance(rays);
+    for (const BentRay& each : rays) ++result.counts[static_cast<std::size_t>(land(source, each, photon, result))];
+  }
+
+  PhotonEnd land(const Source& source, const BentRay& ray, const EmittedPhoton& emitted, ChunkPhotons& result) const {
+    if (!ray.arrives) return PhotonEnd::stopped;
+    const auto hit = surface_at_end(surfaces_, ray);
+    if (!hit) return PhotonEnd::escaped;
+    if (!settings_.serves(source.light, hit->surface)) return PhotonEnd::landed;
+    Photon photon;
+    photon.position = hit->position.cast<float>();
+    photon.direction = ray.direction.cast<float>();
+    photon.normal = hit->normal.cast<float>();
+    const auto count = static_cast<double>(source.count);
+    photon.density = count * emitted.density * ray.jacobian;
+    photon.power = emitted.power / count * ray.radiance_scale * (*source.strength)[static_cast<std::size_t>(ray.band)];
+    photon.surface = hit->surface;
+    photon.light = source.light;
+    photon.band = ray.band;
+    if (hit->surface < settings_.plates.size() && settings_.plates[hit->surface])
+      add_mirrored(photon, *settings_.plates[hit->surface], radius_, result.landed);
+    else
+      result.landed.push_back(photon);
+    return PhotonEnd::landed;
+  }
 
   const BendingRegion& region_;
   const SurfaceScene& surfaces_;
@@ -120,61 +165,6 @@ class PhotonTracer {
   int pass_;
   double radius_;
 };
-
-ChunkPhotons PhotonTracer::trace(const Source& source, const Chunk& chunk) const {
-  ChunkPhotons result;
-  const std::uint64_t stream = static_cast<std::uint64_t>(source.light) * settings_.passes + pass_;
-  for (std::uint64_t i = chunk.first; i < chunk.last; ++i)
-    trace(source, {settings_.seed ^ photon_seed, stream, static_cast<std::uint32_t>(i), 0}, result);
-  return result;
-}
-
-/// The photons of one position.
-void PhotonTracer::trace(const Source& source, PathSampler sampler, ChunkPhotons& result) const {
-  BentRay ray;
-  ray.place = sampler.next_1d();
-  const EmittedPhoton photon = source.emitter.sample(sampler);
-  ray.position = photon.origin;
-  ray.direction = photon.direction;
-  std::vector<BentRay> rays;
-  for (std::size_t band = 0; band < source.strength->size(); ++band) {
-    ray.band = static_cast<int>(band);
-    if ((*source.strength)[band] > 0) rays.push_back(ray);
-  }
-  const auto hit = surfaces_.intersect(photon.origin, photon.direction);
-  const double entry = region_.entry(photon.origin, photon.direction);
-  const bool enters = entry < (hit ? hit->distance : std::numeric_limits<double>::infinity());
-  if (!enters || !(photon.power > 0)) {  // Without power it is from the side of an area light that does not emit.
-    const PhotonEnd end = hit && !enters ? PhotonEnd::before : PhotonEnd::escaped;
-    result.counts[static_cast<std::size_t>(end)] += rays.size();
-    return;
-  }
-  region_.trace_importance(rays);
-  for (const BentRay& each : rays) ++result.counts[static_cast<std::size_t>(land(source, each, photon, result))];
-}
-
-PhotonEnd PhotonTracer::land(const Source& source, const BentRay& ray, const EmittedPhoton& emitted,
-                             ChunkPhotons& result) const {
-  if (!ray.arrives) return PhotonEnd::stopped;
-  const auto hit = surface_at_end(surfaces_, ray);
-  if (!hit) return PhotonEnd::escaped;
-  if (!settings_.serves(source.light, hit->surface)) return PhotonEnd::landed;
-  Photon photon;
-  photon.position = hit->position.cast<float>();
-  photon.direction = ray.direction.cast<float>();
-  photon.normal = hit->normal.cast<float>();
-  const auto count = static_cast<double>(source.count);
-  photon.density = count * emitted.density * ray.jacobian;
-  photon.power = emitted.power / count * ray.radiance_scale * (*source.strength)[static_cast<std::size_t>(ray.band)];
-  photon.surface = hit->surface;
-  photon.light = source.light;
-  photon.band = ray.band;
-  if (hit->surface < settings_.plates.size() && settings_.plates[hit->surface])
-    add_mirrored(photon, *settings_.plates[hit->surface], radius_, result.landed);
-  else
-    result.landed.push_back(photon);
-  return PhotonEnd::landed;
-}
 
 /// @throw DamagedArchive if the photons cannot be those of the source.
 void copy_chunk(ChunkPhotons& part, const Source& source, std::size_t surfaces, Archive& archive) {

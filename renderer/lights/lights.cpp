@@ -1,8 +1,6 @@
 #include "renderer/lights/lights.h"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>

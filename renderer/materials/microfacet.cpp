@@ -1,6 +1,5 @@
 #include "renderer/materials/microfacet.h"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -18,6 +17,13 @@ double square(double x) { return x * x; }
 /// The projected area of the visible facets is (cosine + spread) / 2, where Smith's Λ = (spread / cosine - 1) / 2. G1
 /// and G2 in terms of it need no division by a cosine.
 double spread(double alpha, double cosine) { return std::sqrt(square(alpha) + (1 - square(alpha)) * square(cosine)); }
+
+/// D(m): the area of facets with the normal m, per unit of surface and steradian.
+double ggx_facets(double alpha, const Eigen::Vector3d& m) {
+  if (m.z() <= 0) return 0;
+  const double stretched = (square(m.x()) + square(m.y())) / square(alpha) + square(m.z());
+  return 1 / (pi * square(alpha * stretched));
+}
 
 /// Greatest `horizon` of a table. Fresnel's reflectance changes near the horizon even where masking does not.
 constexpr double widest_horizon = 0.02;
@@ -44,12 +50,6 @@ double ggx_alpha(double roughness, const char* parameter) {
   if (!(roughness >= 0 && roughness <= 1))
     throw std::invalid_argument(std::string(parameter) + " is " + std::to_string(roughness) + "; give a value in 0..1");
   return square(std::max(roughness, min_roughness));
-}
-
-double ggx_facets(double alpha, const Eigen::Vector3d& m) {
-  if (m.z() <= 0) return 0;
-  const double stretched = (square(m.x()) + square(m.y())) / square(alpha) + square(m.z());
-  return 1 / (pi * square(alpha * stretched));
 }
 
 Eigen::Vector3d ggx_sample_visible(double alpha, const Eigen::Vector3d& wo, const Eigen::Vector2d& u) {

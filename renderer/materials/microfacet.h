@@ -23,9 +23,6 @@ constexpr double min_roughness = 0.02;
 /// @throw std::invalid_argument naming `parameter` unless the roughness is 0 to 1.
 double ggx_alpha(double roughness, const char* parameter);
 
-/// D(m): the area of facets with the normal m, per unit of surface and steradian.
-double ggx_facets(double alpha, const Eigen::Vector3d& m);
-
 /// Samples a normal of the facets visible from wo, with the density ggx_visible_pdf (Heitz 2018, "Sampling the GGX
 /// Distribution of Visible Normals").
 /// @param u  In [0, 1)².
@@ -35,7 +32,7 @@ double ggx_visible_pdf(double alpha, const Eigen::Vector3d& wo, const Eigen::Vec
 /// The fraction of a facet, visible from one direction, that is also visible from another one: G2 / G1(wo), <= 1.
 double ggx_shadowing(double alpha, double cosine_o, double cosine_i);
 
-/// Single bounces between the directions of a HalfVector. Both are finite for cosines > 0, and f · cosine_i / pdf is
+/// Single bounces between two directions. Both are finite for cosines > 0, and f · cosine_i / pdf is
 /// ggx_shadowing.
 struct GgxReflection {
   double f = 0;    ///< Of a surface of perfect mirrors.

@@ -22,7 +22,6 @@ namespace {
 
 enum class Encoding { ascii, little_endian, big_endian };
 
-/// How a number is stored.
 struct NumberType {
   int bytes = 0;
   double (*decoded)(const char* bytes, ByteOrder order) = nullptr;

@@ -25,8 +25,6 @@ class Distribution1D {
   /// The cell that contains `u` (in [0, 1)), by inversion: monotonic, and never a cell of probability 0.
   Sample sample(double u) const;
   double probability(int cell) const { return cumulative_[cell + 1] - cumulative_[cell]; }
-
-  int size() const { return static_cast<int>(cumulative_.size()) - 1; }
   double sum() const { return sum_; }  ///< Sum of the values.
 
  private:

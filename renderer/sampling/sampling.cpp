@@ -1,6 +1,5 @@
 #include "renderer/sampling/sampling.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 

@@ -1,7 +1,7 @@
 #include <cmath>
 #include <utility>
 
-#include "renderer/shading/stages.h"
+#include "renderer/shading/wavefront.h"
 
 namespace tensorray {
 namespace {
@@ -28,7 +28,6 @@ void follow_bent_ray(const Wavefront& front, const WaitingPath& waiting, std::si
   path.throughput.setConstant(1, front.traced.throughput[ray] * (bent.radiance_scale * waiting.share));
 }
 
-/// What the region does to a ray of the camera.
 BentView bent_view(const BentPaths& traced, const WaitingPath& waiting) {
   BentView view{0, 0, 0};
   const auto count = static_cast<double>(waiting.last - waiting.first);
@@ -43,7 +42,6 @@ BentView bent_view(const BentPaths& traced, const WaitingPath& waiting) {
   return view;
 }
 
-/// @param number  Of the bent ray.
 void continue_bent_ray(Wavefront& front, const WaitingPath& waiting, std::size_t number, PathState& path) {
   const BentRay& ray = front.traced.rays[number];
   const bool is_view = waiting.depth == 0;

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "renderer/shading/stages.h"
+#include "renderer/shading/wavefront.h"
 
 namespace tensorray {
 namespace {
@@ -97,8 +97,7 @@ void shade_occlusion(Wavefront& front, const PathState& path) {
   const Vector3d direction =
       frame_about(vertex.normal) * square_to_cosine_hemisphere(path.sampler.at_surface(1).direction);
   const Vector3d start = surfaces.start(vertex.hit, vertex.hit.lifted_position, vertex.side);
-  if (!surfaces.occluded(start, direction, front.settings.occlusion_distance))
-    ray_light(front, path) += path.throughput * vertex.reflectance;
+  if (!surfaces.occluded(start, direction)) ray_light(front, path) += path.throughput * vertex.reflectance;
 }
 
 }  // namespace

@@ -1,12 +1,10 @@
 #include "renderer/shading/shading.h"
 
-#include <limits>
 #include <set>
-#include <stdexcept>
 #include <string>
 
 #include "base/errors.h"
-#include "renderer/shading/stages.h"
+#include "renderer/shading/wavefront.h"
 
 namespace tensorray {
 namespace {
@@ -57,7 +55,6 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
   require(settings.roulette_depth >= 1, "roulette_depth must be >= 1");
   require(settings.indirect_clamp >= 0, "indirect_clamp must be >= 0");
   require(settings.pixel_angle >= 0, "pixel_angle must be >= 0");
-  require(settings.occlusion_distance > 0, "occlusion_distance must be > 0");
   for (std::size_t i = 0; i < scene.materials.size(); ++i)
     require(scene.materials[i].reflectance.size() == scene.colors.bands(),
             "material " + std::to_string(i) + " must have a reflectance for each band of the light");

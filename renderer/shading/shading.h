@@ -4,11 +4,9 @@
 ///
 /// The stages stand in files of their own, as free functions of the batch and of a path (wavefront.h):
 /// find_surfaces (shading.cpp) → shade_surface: add_traced_light, sample_direct_light, scatter → wait_at_region →
-/// trace_bent_rays → continue_paths (stages.h), and again from shade_surface on, until no path waits. Without a
+/// trace_bent_rays → continue_paths, and again from shade_surface on, until no path waits. Without a
 /// BendingRegion no path waits.
 
-#include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -58,8 +56,6 @@ struct ShadingSettings {
   /// The angle of a pixel as the camera sees it, radians. Bent rays of the camera may be off by a fifth of it, so that
   /// rays of some bands are interpolated between those of others. 0: the ray of each band is traced.
   double pixel_angle = 0;
-  /// World units; beyond it nothing hides the sky.
-  double occlusion_distance = std::numeric_limits<double>::infinity();
 };
 
 /// The scene to draw. It refers to its parts, which must outlive it.

@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "renderer/shading/stages.h"
+#include "renderer/shading/wavefront.h"
 
 namespace tensorray {
 namespace {

@@ -1,7 +1,6 @@
 #include "renderer/spectra/reflectance.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>

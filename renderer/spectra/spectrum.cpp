@@ -92,7 +92,6 @@ void check_range(double min, double max, int count) {
                                 text(count));
 }
 
-/// Scales so that power and Y sum to 1.
 void normalize(std::vector<Band>& bands, const std::string& range) {
   Amount sum;
   for (const Band& band : bands) {
@@ -200,9 +199,9 @@ Spectrum read_spectrum(const std::filesystem::path& path) {
 Eigen::Vector3d observer(double wavelength) {
   if (!(wavelength >= observer_min && wavelength <= observer_max)) return Eigen::Vector3d::Zero();
   const double position = wavelength - observer_min;
-  const std::size_t i = std::min(static_cast<std::size_t>(position), cie_1931_observer.size() - 2);
+  const std::size_t i = std::min(static_cast<std::size_t>(position), cie_1931_observer.size() / 3 - 2);
   const double weight = position - static_cast<double>(i);
-  const Eigen::Map<const Eigen::Vector3d> below(cie_1931_observer[i].data()), above(cie_1931_observer[i + 1].data());
+  const Eigen::Map<const Eigen::Vector3d> below(&cie_1931_observer[3 * i]), above(&cie_1931_observer[3 * i + 3]);
   return (1 - weight) * below + weight * above;
 }
 

@@ -19,8 +19,6 @@ struct SurfaceTexture {
   Plate plate;  ///< Where the picture lies; its pixels are those of `colors`. Beyond its edges their colours go on.
   std::vector<Eigen::Vector3f> colors;  ///< Row by row from the top; working space, 0 to 1.
   bool smooth = true;                   ///< Linear interpolation between the middles of pixels; false: sharp pixels.
-
-  Eigen::Vector3f color_at(const Eigen::Vector3d& point) const;  ///< At a point of the surface.
 };
 
 /// Strands of round cones: the centre and the radius change linearly from point to point, and the ends are round.

@@ -158,6 +158,27 @@ Vector3d tangent(const RoundCurves& curves, std::uint32_t point, const Vector3d&
   return mean.squaredNorm() > 0.01 ? Vector3d(mean.normalized()) : axis;
 }
 
+Vector3f color_at(const SurfaceTexture& texture, const Vector3d& point) {
+  const Plate& plate = texture.plate;
+  const Eigen::Vector2i last = plate.resolution.array() - 1;
+  const auto pixel = [&](const Eigen::Vector2i& at) -> const Vector3f& {
+    const Eigen::Vector2i inside = at.cwiseMax(0).cwiseMin(last);
+    return texture.colors[static_cast<std::size_t>(inside.y()) * static_cast<std::size_t>(last.x() + 1) +
+                          static_cast<std::size_t>(inside.x())];
+  };
+  // Far beyond the edges all colours are those of the edge, and integers do not overflow.
+  const Eigen::Vector2d at =
+      plate.to_pixel(point).cwiseMax(-1.0).cwiseMin(last.cast<double>().array().matrix() + Eigen::Vector2d(2, 2));
+  if (!texture.smooth) return pixel(at.array().floor().cast<int>());
+  const Eigen::Array2d corner = (at.array() - 0.5).floor();
+  const Eigen::Array2f part = (at.array() - 0.5 - corner).cast<float>();
+  const Eigen::Vector2i first = corner.cast<int>();
+  const auto row = [&](int y) -> Vector3f {
+    return (1 - part.x()) * pixel(first + Eigen::Vector2i(0, y)) + part.x() * pixel(first + Eigen::Vector2i(1, y));
+  };
+  return (1 - part.y()) * row(0) + part.y() * row(1);
+}
+
 }  // namespace
 
 struct SurfaceScene::State {
@@ -169,135 +190,151 @@ struct SurfaceScene::State {
   Owned<RTCDevice> device;
   Owned<RTCScene> scene;
 
-  void build();
-  void attach(unsigned id, const TriangleMesh& mesh);
-  void attach(unsigned id, const RoundCurves& curves);
-  float* new_points(RTCGeometry geometry, const std::vector<Vector3d>& positions, const std::vector<float>* radii);
-  void commit(unsigned id, RTCGeometry geometry);
-
-  RTCRay ray(const Vector3d& start, const Vector3d& direction, double distance) const;
-  double approach(const Vector3d& from, const Vector3d& direction) const;
-  RTCRayHit search(const StraightRay& ray) const;
-  std::optional<SurfaceHit> found(const StraightRay& ray, const RTCRayHit& result) const;
-  Corners corners(const SurfaceHit& hit) const;
-  void complete(const TriangleMesh& mesh, const Vector3d& direction, SurfaceHit& hit) const;
-  void complete(const RoundCurves& curves, SurfaceHit& hit) const;
-};
-
-void SurfaceScene::State::build() {
-  device = embree::make_device(widest_vectors);
-  scene.reset(rtcNewScene(device.get()));
-  check(device.get());
-  std::size_t triangles = 0;
-  for (const ShadedSurface& surface : surfaces)
-    if (const auto* mesh = std::get_if<TriangleMesh>(&surface.shape)) triangles += mesh->triangles.size();
-  const bool is_large = triangles >= large_scene;
-  rtcSetSceneFlags(scene.get(), is_large ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(scene.get(), is_large ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
-  segments.resize(surfaces.size());
-  for (std::size_t i = 0; i < surfaces.size(); ++i)
-    std::visit([&](const auto& shape) { attach(static_cast<unsigned>(i), shape); }, surfaces[i].shape);
-  rtcCommitScene(scene.get());
-  check(device.get());
-}
-
-void SurfaceScene::State::commit(unsigned id, RTCGeometry geometry) {
-  check(device.get());
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometryByID(scene.get(), geometry, id);
-  check(device.get());
-}
-
-/// Makes Embree's own copy of the points, in the scene's coordinates.
-float* SurfaceScene::State::new_points(RTCGeometry geometry, const std::vector<Vector3d>& positions,
-                                       const std::vector<float>* radii) {
-  const std::size_t values = radii ? 4 : 3;
-  auto* const buffer = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
-                                                                   radii ? RTC_FORMAT_FLOAT4 : RTC_FORMAT_FLOAT3,
-                                                                   values * sizeof(float), positions.size()));
-  check(device.get());
-  float* next = buffer;
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    for (int axis = 0; axis < 3; ++axis) *next++ = static_cast<float>((positions[i][axis] - origin[axis]) / unit);
-    if (radii) *next++ = static_cast<float>((*radii)[i] / unit);
+  void build() {
+    device = embree::make_device(widest_vectors);
+    scene.reset(rtcNewScene(device.get()));
+    check(device.get());
+    std::size_t triangles = 0;
+    for (const ShadedSurface& surface : surfaces)
+      if (const auto* mesh = std::get_if<TriangleMesh>(&surface.shape)) triangles += mesh->triangles.size();
+    const bool is_large = triangles >= large_scene;
+    rtcSetSceneFlags(scene.get(), is_large ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene.get(), is_large ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+    segments.resize(surfaces.size());
+    for (std::size_t i = 0; i < surfaces.size(); ++i)
+      std::visit([&](const auto& shape) { attach(static_cast<unsigned>(i), shape); }, surfaces[i].shape);
+    rtcCommitScene(scene.get());
+    check(device.get());
   }
-  return buffer;
-}
 
-void SurfaceScene::State::attach(unsigned id, const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) return;
-  const Owned<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
-  new_points(geometry.get(), mesh.vertices, nullptr);
-  rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
-                             sizeof(mesh.triangles[0]), mesh.triangles.size());
-  commit(id, geometry.get());
-}
+  void attach(unsigned id, const TriangleMesh& mesh) {
+    if (mesh.triangles.empty()) return;
+    const Owned<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    new_points(geometry.get(), mesh.vertices, nullptr);
+    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
+                               sizeof(mesh.triangles[0]), mesh.triangles.size());
+    commit(id, geometry.get());
+  }
 
-void SurfaceScene::State::attach(unsigned id, const RoundCurves& curves) {
-  const Owned<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE));
-  Segments& parts = segments[id];
-  parts = segments_of(curves);
-  if (parts.first_point.empty()) return;
-  new_points(geometry.get(), curves.points, &curves.radii);
-  rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, parts.first_point.data(), 0,
-                             sizeof(std::uint32_t), parts.first_point.size());
-  rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, parts.neighbors.data(), 0, 1,
-                             parts.neighbors.size());
-  commit(id, geometry.get());
-}
+  void attach(unsigned id, const RoundCurves& curves) {
+    const Owned<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE));
+    Segments& parts = segments[id];
+    parts = segments_of(curves);
+    if (parts.first_point.empty()) return;
+    new_points(geometry.get(), curves.points, &curves.radii);
+    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, parts.first_point.data(), 0,
+                               sizeof(std::uint32_t), parts.first_point.size());
+    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, parts.neighbors.data(), 0, 1,
+                               parts.neighbors.size());
+    commit(id, geometry.get());
+  }
 
-RTCRay SurfaceScene::State::ray(const Vector3d& start, const Vector3d& direction, double distance) const {
-  const double scale = 1 / unit;
-  return embree::ray_of((scale * (start - origin)).cast<float>(), direction, scale * distance);
-}
+  /// Makes Embree's own copy of the points, in the scene's coordinates.
+  float* new_points(RTCGeometry geometry, const std::vector<Vector3d>& positions, const std::vector<float>* radii) {
+    const std::size_t values = radii ? 4 : 3;
+    auto* const buffer = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                                                     radii ? RTC_FORMAT_FLOAT4 : RTC_FORMAT_FLOAT3,
+                                                                     values * sizeof(float), positions.size()));
+    check(device.get());
+    float* next = buffer;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      for (int axis = 0; axis < 3; ++axis) *next++ = static_cast<float>((positions[i][axis] - origin[axis]) / unit);
+      if (radii) *next++ = static_cast<float>((*radii)[i] / unit);
+    }
+    return buffer;
+  }
 
-/// Distance that a ray travels before it comes near the scene. Far from the scene, single precision is not enough.
-double SurfaceScene::State::approach(const Vector3d& from, const Vector3d& direction) const {
-  const Vector3d way = origin - from;
-  return way.squaredNorm() > 4 * unit * unit ? std::max(0.0, way.dot(direction) - 1.5 * unit) : 0.0;
-}
+  void commit(unsigned id, RTCGeometry geometry) {
+    check(device.get());
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(scene.get(), geometry, id);
+    check(device.get());
+  }
 
-Corners SurfaceScene::State::corners(const SurfaceHit& hit) const {
-  if (const auto* mesh = std::get_if<TriangleMesh>(&surfaces[hit.surface].shape))
-    return {mesh->triangles[hit.primitive], {1.0 - hit.u - hit.v, hit.u, hit.v}};
-  const std::uint32_t point = segments[hit.surface].first_point[hit.primitive];
-  return {{point, point + 1, point}, {1.0 - hit.u, hit.u, 0.0}};
-}
+  RTCRay ray(const Vector3d& start, const Vector3d& direction, double distance) const {
+    const double scale = 1 / unit;
+    return embree::ray_of((scale * (start - origin)).cast<float>(), direction, scale * distance);
+  }
 
-void SurfaceScene::State::complete(const TriangleMesh& mesh, const Vector3d& direction, SurfaceHit& hit) const {
-  const Corners corner = corners(hit);
-  const auto& [a, b, c] = corner.point;
-  const Vector3d cross = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-  hit.position = hit.lifted_position = corner.mean(mesh.vertices);
-  hit.normal = hit.shading_normal = cross.normalized();
-  const std::vector<Vector3f>& normals = surfaces[hit.surface].normals;
-  if (normals.empty()) return;
-  const Vector3d smooth = corner.mean(normals).cast<double>();
-  if (!(smooth.squaredNorm() > 0)) return;
-  hit.shading_normal = smooth.dot(hit.normal) < 0 ? Vector3d(-smooth.normalized()) : smooth.normalized();
-  const double side = hit.normal.dot(direction) > 0 ? -1 : 1;
-  hit.lifted_position = lifted(mesh.vertices, normals, corner, hit.position, side * hit.normal, side);
-}
+  /// Distance that a ray travels before it comes near the scene. Far from the scene, single precision is not enough.
+  double approach(const Vector3d& from, const Vector3d& direction) const {
+    const Vector3d way = origin - from;
+    return way.squaredNorm() > 4 * unit * unit ? std::max(0.0, way.dot(direction) - 1.5 * unit) : 0.0;
+  }
 
-/// Tilts the shading normal as the smooth axis is tilted against the segment's axis.
-void SurfaceScene::State::complete(const RoundCurves& curves, SurfaceHit& hit) const {
-  hit.lifted_position = hit.position;
-  hit.shading_normal = hit.normal;
-  const std::uint32_t point = segments[hit.surface].first_point[hit.primitive];
-  const Vector3d axis = (curves.points[point + 1] - curves.points[point]).stableNormalized();
-  const int neighbors = segments[hit.surface].neighbors[hit.primitive];
-  const bool left = neighbors & RTC_CURVE_FLAG_NEIGHBOR_LEFT, right = neighbors & RTC_CURVE_FLAG_NEIGHBOR_RIGHT;
-  const bool on_cap = (hit.u <= 0 && !left) || (hit.u >= 1 && !right);
-  if (on_cap) return;
-  const Vector3d begin = left ? tangent(curves, point, axis) : axis;
-  const Vector3d end = right ? tangent(curves, point + 1, axis) : axis;
-  const Vector3d smooth_axis = ((1.0 - hit.u) * begin + hit.u * end).normalized();
-  const double along = hit.normal.dot(axis);
-  const Vector3d across = hit.normal - hit.normal.dot(smooth_axis) * smooth_axis;
-  if (!(across.squaredNorm() > 0.01)) return;
-  const Vector3d turned = std::sqrt(std::max(0.0, 1 - along * along)) * across.normalized() + along * smooth_axis;
-  if (turned.dot(hit.normal) > 0) hit.shading_normal = turned.normalized();
-}
+  RTCRayHit search(const StraightRay& ray) const {
+    const Vector3d start = ray.origin + approach(ray.origin, ray.direction) * ray.direction;
+    return embree::search_along(this->ray(start, ray.direction, std::numeric_limits<double>::infinity()));
+  }
+
+  /// What Embree's `result` of `search` is.
+  std::optional<SurfaceHit> found(const StraightRay& ray, const RTCRayHit& result) const {
+    if (result.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+    std::optional<SurfaceHit> found(std::in_place);
+    SurfaceHit& hit = *found;
+    hit.surface = result.hit.geomID;
+    hit.primitive = result.hit.primID;
+    hit.u = result.hit.u;
+    const ShadedSurface& surface = surfaces[hit.surface];
+    const auto* mesh = std::get_if<TriangleMesh>(&surface.shape);
+    if (mesh) hit.v = result.hit.v;
+    // Colours come first, so that they are loaded while the rest is computed.
+    if (!surface.texture && !surface.colors.empty()) hit.color = corners(hit).mean(surface.colors);
+    if (mesh) {
+      complete(*mesh, ray.direction, hit);
+    } else {
+      const double distance = approach(ray.origin, ray.direction) + result.ray.tfar * unit;
+      hit.position = ray.origin + distance * ray.direction;
+      hit.normal = Vector3d(result.hit.Ng_x, result.hit.Ng_y, result.hit.Ng_z).stableNormalized();
+      complete(std::get<RoundCurves>(surface.shape), hit);
+    }
+    hit.distance = (hit.position - ray.origin).dot(ray.direction);
+    if (surface.texture) hit.color = color_at(*surface.texture, hit.position);
+    return found;
+  }
+
+  Corners corners(const SurfaceHit& hit) const {
+    if (const auto* mesh = std::get_if<TriangleMesh>(&surfaces[hit.surface].shape))
+      return {mesh->triangles[hit.primitive], {1.0 - hit.u - hit.v, hit.u, hit.v}};
+    const std::uint32_t point = segments[hit.surface].first_point[hit.primitive];
+    return {{point, point + 1, point}, {1.0 - hit.u, hit.u, 0.0}};
+  }
+
+  void complete(const TriangleMesh& mesh, const Vector3d& direction, SurfaceHit& hit) const {
+    const Corners corner = corners(hit);
+    const auto& [a, b, c] = corner.point;
+    const Vector3d cross = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
+    hit.position = hit.lifted_position = corner.mean(mesh.vertices);
+    hit.normal = hit.shading_normal = cross.normalized();
+    const std::vector<Vector3f>& normals = surfaces[hit.surface].normals;
+    if (normals.empty()) return;
+    const Vector3d smooth = corner.mean(normals).cast<double>();
+    if (!(smooth.squaredNorm() > 0)) return;
+    hit.shading_normal = smooth.dot(hit.normal) < 0 ? Vector3d(-smooth.normalized()) : smooth.normalized();
+    const double side = hit.normal.dot(direction) > 0 ? -1 : 1;
+    hit.lifted_position = lifted(mesh.vertices, normals, corner, hit.position, side * hit.normal, side);
+  }
+
+  /// Tilts the shading normal as the smooth axis is tilted against the segment's axis.
+  void complete(const RoundCurves& curves, SurfaceHit& hit) const {
+    hit.lifted_position = hit.position;
+    hit.shading_normal = hit.normal;
+    const std::uint32_t point = segments[hit.surface].first_point[hit.primitive];
+    const Vector3d axis = (curves.points[point + 1] - curves.points[point]).stableNormalized();
+    const int neighbors = segments[hit.surface].neighbors[hit.primitive];
+    const bool left = neighbors & RTC_CURVE_FLAG_NEIGHBOR_LEFT, right = neighbors & RTC_CURVE_FLAG_NEIGHBOR_RIGHT;
+    const bool on_cap = (hit.u <= 0 && !left) || (hit.u >= 1 && !right);
+    if (on_cap) return;
+    const Vector3d begin = left ? tangent(curves, point, axis) : axis;
+    const Vector3d end = right ? tangent(curves, point + 1, axis) : axis;
+    const Vector3d smooth_axis = ((1.0 - hit.u) * begin + hit.u * end).normalized();
+    const double along = hit.normal.dot(axis);
+    const Vector3d across = hit.normal - hit.normal.dot(smooth_axis) * smooth_axis;
+    if (!(across.squaredNorm() > 0.01)) return;
+    const Vector3d turned = std::sqrt(std::max(0.0, 1 - along * along)) * across.normalized() + along * smooth_axis;
+    if (turned.dot(hit.normal) > 0) hit.shading_normal = turned.normalized();
+  }
+};
 
 SurfaceScene::SurfaceScene(std::vector<ShadedSurface> surfaces) : state_(new State) {
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
@@ -319,43 +356,8 @@ SurfaceScene::SurfaceScene(std::vector<ShadedSurface> surfaces) : state_(new Sta
   state_->build();
 }
 
-SurfaceScene::~SurfaceScene() = default;
-SurfaceScene::SurfaceScene(SurfaceScene&&) noexcept = default;
-SurfaceScene& SurfaceScene::operator=(SurfaceScene&&) noexcept = default;
-
 const std::vector<ShadedSurface>& SurfaceScene::surfaces() const { return state_->surfaces; }
 const Eigen::AlignedBox3d& SurfaceScene::bounds() const { return state_->bounds; }
-
-RTCRayHit SurfaceScene::State::search(const StraightRay& ray) const {
-  const Vector3d start = ray.origin + approach(ray.origin, ray.direction) * ray.direction;
-  return embree::search_along(this->ray(start, ray.direction, std::numeric_limits<double>::infinity()));
-}
-
-/// What Embree's `result` of `search` is.
-std::optional<SurfaceHit> SurfaceScene::State::found(const StraightRay& ray, const RTCRayHit& result) const {
-  if (result.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  std::optional<SurfaceHit> found(std::in_place);
-  SurfaceHit& hit = *found;
-  hit.surface = result.hit.geomID;
-  hit.primitive = result.hit.primID;
-  hit.u = result.hit.u;
-  const ShadedSurface& surface = surfaces[hit.surface];
-  const auto* mesh = std::get_if<TriangleMesh>(&surface.shape);
-  if (mesh) hit.v = result.hit.v;
-  // Colours come first, so that they are loaded while the rest is computed.
-  if (!surface.texture && !surface.colors.empty()) hit.color = corners(hit).mean(surface.colors);
-  if (mesh) {
-    complete(*mesh, ray.direction, hit);
-  } else {
-    const double distance = approach(ray.origin, ray.direction) + result.ray.tfar * unit;
-    hit.position = ray.origin + distance * ray.direction;
-    hit.normal = Vector3d(result.hit.Ng_x, result.hit.Ng_y, result.hit.Ng_z).stableNormalized();
-    complete(std::get<RoundCurves>(surface.shape), hit);
-  }
-  hit.distance = (hit.position - ray.origin).dot(ray.direction);
-  if (surface.texture) hit.color = surface.texture->color_at(hit.position);
-  return found;
-}
 
 std::optional<SurfaceHit> SurfaceScene::intersect(const Vector3d& origin, const Vector3d& direction) const {
   const StraightRay ray{origin, direction};

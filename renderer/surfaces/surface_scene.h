@@ -51,9 +51,6 @@ class SurfaceScene {
   /// range, a value that is not finite in single precision; std::runtime_error if Embree fails (out of memory,
   /// unsupported processor).
   explicit SurfaceScene(std::vector<ShadedSurface> surfaces);
-  ~SurfaceScene();
-  SurfaceScene(SurfaceScene&&) noexcept;
-  SurfaceScene& operator=(SurfaceScene&&) noexcept;
 
   /// The nearest surface along the unit `direction`, from either side. Rays may start anywhere. There is no hit if the
   /// origin is so far away that double precision does not resolve the scene, or if a value is not finite.
@@ -80,7 +77,7 @@ class SurfaceScene {
 
  private:
   struct State;
-  std::unique_ptr<State> state_;
+  std::shared_ptr<State> state_;
   double offset_ = 0;
 };
 

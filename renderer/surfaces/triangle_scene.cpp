@@ -52,75 +52,63 @@ struct TriangleScene::State {
   Owned<RTCDevice> device;
   Owned<RTCScene> scene;  // Null if there are no triangles.
 
-  void start(RTCBuildQuality quality);
+  void start(RTCBuildQuality quality) {
+    device = embree::make_device();
+    scene.reset(rtcNewScene(device.get()));
+    check(device.get());
+    rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | embree::all_triangles_flag));
+    rtcSetSceneBuildQuality(scene.get(), quality);
+  }
 
   /// Vertices may have two or three coordinates.
   template <class Vertex>
   void attach(unsigned id, const std::vector<Vertex>& vertices,
-              const std::vector<std::array<std::uint32_t, 3>>& triangles);
+              const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+    const Owned<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    check(device.get());
+    auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(
+        geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices.size()));
+    auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
+        geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles.size()));
+    check(device.get());
+    constexpr int axes = Vertex::RowsAtCompileTime;
+    for (const Vertex& vertex : vertices) {
+      for (int axis = 0; axis < axes; ++axis) *positions++ = local(vertex[axis], axis);
+      if constexpr (axes == 2) *positions++ = 0;
+    }
+    for (const auto& triangle : triangles) indices = std::copy(triangle.begin(), triangle.end(), indices);
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometryByID(scene.get(), geometry.get(), id);
+    check(device.get());
+  }
 
   void commit() {
     rtcCommitScene(scene.get());
     check(device.get());
   }
 
-  void enclose(const std::vector<const TriangleMesh*>& meshes);
+  void enclose(const std::vector<const TriangleMesh*>& meshes) {
+    for (const TriangleMesh* mesh : meshes) box.extend(mesh->bounds());
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(unit + 1e-6 * (box.max() - box.min()).maxCoeff());
+    box = {box.min() - margin, box.max() + margin};
+  }
 
   float local(double coordinate, int axis) const { return static_cast<float>((coordinate - origin[axis]) / unit); }
 
-  bool is_far(const Eigen::Vector3d& point) const;
-  RTCRayHit ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
-                double max_distance) const;
-};
-
-void TriangleScene::State::enclose(const std::vector<const TriangleMesh*>& meshes) {
-  for (const TriangleMesh* mesh : meshes) box.extend(mesh->bounds());
-  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(unit + 1e-6 * (box.max() - box.min()).maxCoeff());
-  box = {box.min() - margin, box.max() + margin};
-}
-
-/// Whether single precision does not resolve the triangles from this point. NaN counts as far.
-bool TriangleScene::State::is_far(const Eigen::Vector3d& point) const {
-  constexpr double near = 16;  // In units.
-  return !((point - origin).array().abs() <= near * unit).all();
-}
-
-void TriangleScene::State::start(RTCBuildQuality quality) {
-  device = embree::make_device();
-  scene.reset(rtcNewScene(device.get()));
-  check(device.get());
-  rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | embree::all_triangles_flag));
-  rtcSetSceneBuildQuality(scene.get(), quality);
-}
-
-template <class Vertex>
-void TriangleScene::State::attach(unsigned id, const std::vector<Vertex>& vertices,
-                                  const std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  const Owned<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
-  check(device.get());
-  auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0,
-                                                                RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices.size()));
-  auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
-      geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles.size()));
-  check(device.get());
-  constexpr int axes = Vertex::RowsAtCompileTime;
-  for (const Vertex& vertex : vertices) {
-    for (int axis = 0; axis < axes; ++axis) *positions++ = local(vertex[axis], axis);
-    if constexpr (axes == 2) *positions++ = 0;
+  /// Whether single precision does not resolve the triangles from this point. NaN counts as far.
+  bool is_far(const Eigen::Vector3d& point) const {
+    constexpr double near = 16;  // In units.
+    return !((point - origin).array().abs() <= near * unit).all();
   }
-  for (const auto& triangle : triangles) indices = std::copy(triangle.begin(), triangle.end(), indices);
-  rtcCommitGeometry(geometry.get());
-  rtcAttachGeometryByID(scene.get(), geometry.get(), id);
-  check(device.get());
-}
 
-RTCRayHit TriangleScene::State::ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
-                                    double max_distance) const {
-  // Embree finds no hits behind a ray's origin, so the ray starts at `min_distance`.
-  const Eigen::Vector3d start = from + min_distance * direction;
-  return embree::search_along(embree::ray_of({local(start.x(), 0), local(start.y(), 1), local(start.z(), 2)}, direction,
-                                             (max_distance - min_distance) / unit));
-}
+  RTCRayHit ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
+                double max_distance) const {
+    // Embree finds no hits behind a ray's origin, so the ray starts at `min_distance`.
+    const Eigen::Vector3d start = from + min_distance * direction;
+    return embree::search_along(embree::ray_of({local(start.x(), 0), local(start.y(), 1), local(start.z(), 2)},
+                                               direction, (max_distance - min_distance) / unit));
+  }
+};
 
 TriangleScene::TriangleScene(const std::vector<const TriangleMesh*>& meshes, const Eigen::Vector3d& origin, double unit)
     : state_(new State{origin, unit, {}, nullptr, nullptr}) {
@@ -143,15 +131,9 @@ TriangleScene::TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
   state_->commit();
 }
 
-TriangleScene::~TriangleScene() = default;
-TriangleScene::TriangleScene(TriangleScene&&) noexcept = default;
-TriangleScene& TriangleScene::operator=(TriangleScene&&) noexcept = default;
-
-bool TriangleScene::empty() const { return !state_->scene; }
-
 std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
                                                   double min_distance, double max_distance) const {
-  if (empty()) return std::nullopt;
+  if (!state_->scene) return std::nullopt;
   if (state_->is_far(from + min_distance * direction)) {
     const auto way = entry(state_->box, from, direction);
     if (!way || *way > max_distance) return std::nullopt;
@@ -166,7 +148,7 @@ std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, c
 void TriangleScene::along(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
                           std::vector<TriangleId>& candidates) const {
   candidates.clear();
-  if (empty()) return;
+  if (!state_->scene) return;
   double start = -1e-5 * state_->unit;  // Triangles at the start must not be lost.
   if (state_->is_far(from)) {
     const auto way = entry(state_->box, from, direction);
@@ -183,7 +165,7 @@ void TriangleScene::along(const Eigen::Vector3d& from, const Eigen::Vector3d& di
 
 void TriangleScene::near(const Eigen::Vector3d& point, double radius, std::vector<TriangleId>& candidates) const {
   candidates.clear();
-  if (empty()) return;
+  if (!state_->scene) return;
   RTCPointQuery query{};
   query.x = state_->local(point.x(), 0);
   query.y = state_->local(point.y(), 1);

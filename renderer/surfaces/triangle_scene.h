@@ -45,13 +45,6 @@ class TriangleScene {
   TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
                 const std::vector<std::array<std::uint32_t, 3>>& triangles, const Eigen::Vector2d& origin, double unit);
 
-  ~TriangleScene();
-  TriangleScene(TriangleScene&&) noexcept;
-  TriangleScene& operator=(TriangleScene&&) noexcept;
-
-  /// Whether the scene has no triangles.
-  bool empty() const;
-
   /// The nearest triangle between the two distances (world units; the first may be negative), from either side.
   std::optional<TriangleHit> nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
                                      double max_distance) const;
@@ -67,7 +60,7 @@ class TriangleScene {
 
  private:
   struct State;
-  std::unique_ptr<State> state_;
+  std::shared_ptr<State> state_;
 };
 
 }  // namespace tensorray

@@ -233,7 +233,6 @@ struct TubeJob {
   double value_tolerance, shade_tolerance;
 };
 
-/// A round wire along the ellipse of `point`.
 void add_hoop(const TubeJob& job, const TubePoint& point, TubeMesh& mesh) {
   const TubeSettings& s = job.settings;
   const int pieces = std::max(12, segments_for(max_radius(point), s.tolerance, s));

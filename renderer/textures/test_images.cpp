@@ -21,7 +21,6 @@ constexpr int cells_across = 16;  // Number of cells along the shorter side.
 
 double cell_size(const Image& image) { return std::min(image.width, image.height) / static_cast<double>(cells_across); }
 
-/// Sets each pixel (x, y) to `color(x, y)`.
 template <class Color>
 void fill(Image& image, const Color& color) {
   tbb::parallel_for(0, image.height, [&](int y) {
@@ -220,20 +219,8 @@ void draw_line(Image& image) {
 Image test_image(TestImage which, int width, int height) {
   if (width < 1 || height < 1) throw std::invalid_argument("a test picture must be at least one pixel wide and high");
   Image image(width, height, {"R", "G", "B"});
-  switch (which) {
-    case TestImage::checkerboard:
-      draw_checkerboard(image);
-      break;
-    case TestImage::grid:
-      draw_grid(image);
-      break;
-    case TestImage::color_wheel:
-      draw_color_wheel(image);
-      break;
-    case TestImage::line:
-      draw_line(image);
-      break;
-  }
+  constexpr std::array<void (*)(Image&), 4> draw{draw_checkerboard, draw_grid, draw_color_wheel, draw_line};
+  draw[static_cast<std::size_t>(which)](image);
   return image;
 }
 

@@ -13,7 +13,7 @@
 #include <Eigen/Core>
 
 #include "base/process/job.h"
-#include "renderer/film/plate_photon.h"
+#include "renderer/film/film.h"
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
 #include "renderer/light_maps/photon_counts.h"

@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "renderer/camera/camera.h"
-#include "renderer/camera/pixel_filter.h"
 #include "renderer/charts/color_bar.h"
 #include "renderer/charts/grid_lines.h"
 #include "renderer/charts/lettering.h"
@@ -126,7 +125,6 @@ TEST(Refusals, OfCameras) {
     settings.direction = direction;
     frame_points(points, settings);
   };
-  const auto filter = [](double radius) { PixelFilter(PixelFilterShape::box, radius); };
   refused("two points", [&] { look({1, 2, 3}, up, 40, 10); });
   refused("finite", [&] { look({1, 2, nan_value}, up, 40, 10); });
   refused("up", [&] { look({0, 0, 0}, {0, nan_value, 0}, 40, 10); });
@@ -140,9 +138,6 @@ TEST(Refusals, OfCameras) {
   refused("finite", [&] { framing({{0, 0, 0}, {1, nan_value, 0}}, 0, up); });
   refused("margin", [&] { framing({{0, 0, 0}}, 0.5, up); });
   refused("direction", [&] { framing({{0, 0, 0}}, 0, Vector3d::Zero()); });
-  refused("radius", [&] { filter(0); });
-  refused("radius", [&] { filter(nan_value); });
-  refused("radius", [&] { filter(infinite); });
 }
 
 TEST(Refusals, OfLightAndMatter) {

@@ -8,7 +8,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "renderer/film/image_distance.h"
+#include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
 #include "tools/benchmark/questions.h"
 #include "tools/benchmark/run_render.h"

@@ -1,4 +1,4 @@
-#include "renderer/film/image_distance.h"
+#include "renderer/film/spectral_image.h"
 
 #include <gtest/gtest.h>
 

@@ -181,5 +181,16 @@ TEST(TriangleScene, NearMissesNoBoxAndLeavesOutWhatIsFar) {
   EXPECT_LT(proposed, 500 * 700u / 4);
 }
 
+TEST(TriangleScene, NothingIsFoundWhereThereAreNoTriangles) {
+  const TriangleMesh none;
+  for (const auto& meshes : {std::vector<const TriangleMesh*>{}, std::vector<const TriangleMesh*>{&none, &none}}) {
+    const TriangleScene scene(meshes, Vector3d::Zero(), 1);
+    EXPECT_FALSE(scene.nearest(Vector3d::Zero(), Vector3d::UnitX(), -1, infinite));
+    std::vector<TriangleId> candidates(1);
+    scene.near(Vector3d::Zero(), 1, candidates);
+    EXPECT_TRUE(candidates.empty());
+  }
+}
+
 }  // namespace
 }  // namespace tensorray

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "renderer/film/image_distance.h"
+#include "renderer/film/spectral_image.h"
 #include "tests/data_folder.h"
 #include "tests/scenes/pictures/pictures.h"
 
