@@ -2,6 +2,7 @@
 
 #include <map>
 #include <stdexcept>
+#include <system_error>
 #include <tuple>
 #include <utility>
 
@@ -31,8 +32,8 @@ Identity identity_of(const fs::path& path) {
 }  // namespace
 
 bool is_device(const fs::path& path) {
-  struct stat status {};
-  return stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
+  std::error_code none;
+  return fs::is_other(path, none);
 }
 
 void require_distinct_files(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {

@@ -4,9 +4,11 @@
 /// value both ways. Numbers have the byte order of the machine: all machines of a render must have the same.
 
 #include <cstddef>
+#include <cstring>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace tensorray {
 
@@ -27,7 +29,15 @@ class Archive {
   std::size_t left() const { return rest_.size(); }  ///< Bytes that were not read yet.
 
   /// Of numbers, or structs of them. @throw DamagedArchive if there are not so many bytes.
-  void copy(void* values, std::size_t size);
+  void copy(void* values, std::size_t size) {
+    if (!reads_) {
+      bytes_.append(static_cast<const char*>(values), size);
+      return;
+    }
+    require(size, 1);
+    if (size > 0) std::memcpy(values, rest_.data(), size);  // Pointers of empty vectors may be null.
+    rest_.remove_prefix(size);
+  }
   template <class Value>
   void copy(Value& value) {
     copy(&value, sizeof value);
@@ -58,10 +68,14 @@ class Archive {
   }
 
   /// @throw DamagedArchive if so many values of so many bytes are not left.
-  void require(std::size_t count, std::size_t size) const;
+  void require(std::size_t count, std::size_t size) const {
+    if (count > rest_.size() / size) throw DamagedArchive();
+  }
 
   /// @throw DamagedArchive unless all was read.
-  void finish() const;
+  void finish() const {
+    if (!rest_.empty()) throw DamagedArchive();
+  }
 
   /// What was written.
   std::string take() { return std::move(bytes_); }

@@ -56,6 +56,16 @@ void broadcast_list(Ranks* ranks, Values& values) {
 /// Gives the root what all others have, one after the other, so that it has the bytes of one at a time.
 /// @param copy  At the others, copies what this rank has to an archive; at the root, takes it from there.
 /// @throw as above; DamagedArchive.
-void gather_in_turn(Ranks* ranks, const std::function<void(Archive& archive)>& copy);
+inline void gather_in_turn(Ranks* ranks, const std::function<void(Archive& archive)>& copy) {
+  for (std::size_t rank = 1; ranks && rank < ranks->count(); ++rank) {
+    Archive mine;
+    if (ranks->rank() == rank) copy(mine);
+    const std::vector<std::string> given = ranks->gather(mine.take());
+    if (!is_root(ranks)) continue;
+    Archive archive(given.at(rank));
+    copy(archive);
+    archive.finish();
+  }
+}
 
 }  // namespace tensorray

@@ -40,9 +40,4 @@ void append_number(Number number, ByteOrder order, std::string& bytes) {
   bytes.append(copy.data(), copy.size());
 }
 
-/// Changes `count` numbers of `size` bytes each to the other byte order, in place.
-inline void swap_bytes(char* numbers, std::size_t count, std::size_t size) {
-  for (std::size_t i = 0; i < count; ++i) std::reverse(numbers + i * size, numbers + (i + 1) * size);
-}
-
 }  // namespace tensorray

@@ -3,7 +3,9 @@
 /// Small helpers for text.
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace tensorray {
@@ -31,5 +33,9 @@ std::string lower_case_ending(const std::filesystem::path& path);
 
 /// A number of bytes with its unit: "693.0 KiB", "1.5 MiB", "2.3 GiB".
 std::string bytes_text(double bytes);
+
+/// The number that all of `text` is, as data files write it, in every locale: "1", "+2.5e-3", "nan". Numbers that
+/// double precision does not hold become 0 or infinite.
+std::optional<double> parse_number(std::string_view text);
 
 }  // namespace tensorray

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "base/errors.h"
-#include "base/text/parse_number.h"
 #include "base/text/text.h"
 #include "integrators/seeds/seeds.h"
 

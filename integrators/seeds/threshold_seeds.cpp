@@ -9,7 +9,7 @@
 #include "integrators/seeds/seeds.h"
 #include "renderer/sampling/random.h"
 #include "volumes/bricks/brick_point.h"
-#include "volumes/sampling/sample_tensors.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "base/text/parse_number.h"
 #include "base/text/text.h"
 #include "renderer/meshes/mesh_readers.h"
 

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "base/text/byte_order.h"
-#include "base/text/parse_number.h"
 #include "base/text/text.h"
 #include "renderer/meshes/mesh_readers.h"
 

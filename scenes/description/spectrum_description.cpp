@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "base/text/parse_number.h"
 #include "base/text/text.h"
 
 namespace tensorray {

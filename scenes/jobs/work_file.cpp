@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/errors.h"
-#include "base/files/replace_file.h"
+#include "base/files/output_file.h"
 #include "base/text/content_hash.h"
 #include "base/text/path_text.h"
 #include "scenes/jobs/origin.h"

@@ -19,7 +19,7 @@ struct WorkFile {
   Results results;
 };
 
-/// Replaces `path` so that it is complete at any moment (replace_file.h). @throw std::runtime_error naming the file.
+/// Replaces `path` so that it is complete at any moment (output_file.h). @throw std::runtime_error naming the file.
 void write_work(const std::filesystem::path& path, const WorkFile& work);
 
 /// @throw std::runtime_error naming the file if it is missing, no such file, cut off or damaged.

@@ -8,7 +8,7 @@
 
 #include "base/text/path_text.h"
 #include "scenes/outputs/annotations.h"
-#include "volumes/files/scalar_files.h"
+#include "volumes/files/tensor_files.h"
 
 namespace tensorray {
 namespace {

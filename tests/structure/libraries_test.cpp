@@ -31,8 +31,7 @@ TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
       EXPECT_EQ(homes.at(match[1]), folder) << line.file;
       users[match[1]].insert(line.file);
       // Private headers, which only .cpp files of the same folder include.
-      const std::set<std::string> private_headers{"volumes/vdb/vdb_archive.h", "volumes/vdb/vdb_transform.h",
-                                                  "renderer/surfaces/embree_handles.h",
+      const std::set<std::string> private_headers{"volumes/vdb/vdb_archive.h", "renderer/surfaces/embree_handles.h",
                                                   "tools/viewer/server/server_state.h"};
       const bool private_header = private_headers.count(line.file) > 0;
       EXPECT_TRUE(private_header || !line.is_of_header()) << line.file << ": " << line.text;

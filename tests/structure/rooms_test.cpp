@@ -55,7 +55,7 @@ const std::vector<Room> rooms{
     {"volumes/bricks", {"volumes/grids"}},
     {"volumes/sampling", {"volumes/bricks"}},
     {"volumes/tensors", {"volumes/bricks", "volumes/grids", "volumes/sampling"}},
-    {"volumes/making", {"volumes/bricks", "volumes/grids", "volumes/tensors"}},
+    {"volumes/making", {"volumes/bricks", "volumes/grids", "volumes/sampling", "volumes/tensors"}},
     {"volumes/vdb", {"volumes/grids"}},
     {"volumes/points", {"volumes/vdb"}},
     {"volumes/files", {"volumes/grids", "volumes/tensors", "volumes/vdb"}},

@@ -16,7 +16,6 @@
 #include "tools/command_line/threads.h"
 #include "tools/command_line/vdb_output.h"
 #include "tools/commands/commands.h"
-#include "volumes/files/scalar_files.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/invariants.h"
 

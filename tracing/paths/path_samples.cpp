@@ -5,7 +5,7 @@
 #include <Eigen/LU>
 
 #include "tracing/paths/path_thinning.h"
-#include "volumes/sampling/sample_tensors.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "renderer/surfaces/polyline.h"
-#include "volumes/sampling/sample_tensors.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 // The code before HWY_AFTER_NAMESPACE is compiled once for each kind of processor. It calls no inline functions of
 // other headers: the linker would keep only one of their copies, which may be compiled for the wrong processor.

@@ -12,11 +12,8 @@
 
 #include <Eigen/Geometry>
 
-#include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/brick_layout.h"
-#include "volumes/bricks/brick_memory.h"
-#include "volumes/grids/interpolation.h"
-#include "volumes/grids/tensor_grid.h"
+#include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "volumes/bricks/coefficient_bricks.h"
-#include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
 

@@ -12,7 +12,6 @@
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "volumes/files/grid_voxels.h"
-#include "volumes/vdb/vdb_transform.h"
 
 namespace tensorray {
 namespace {
@@ -163,6 +162,23 @@ void check_half_range(const std::filesystem::path& path, const TensorGrid& grid)
   });
 }
 
+openvdb::FloatGrid::Ptr float_grid(const ScalarGrid& grid) {
+  const auto result = openvdb::FloatGrid::create();
+  for (const ScalarBlock& block : grid.blocks) {
+    auto* leaf = new openvdb::FloatTree::LeafNodeType(coord_of(block.origin));
+    result->tree().addLeaf(leaf);  // The tree owns it.
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[offset]) leaf->setValueOn(static_cast<openvdb::Index>(offset), block.values[offset]);
+  }
+  result->setName(grid.name);
+  place(*result, grid.to_world);
+  result->setGridClass(grid.fog ? openvdb::GRID_FOG_VOLUME : openvdb::GRID_UNKNOWN);
+  for (const auto& [key, value] : grid.metadata)
+    if (!(*result)[key])
+      result->insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, class, ...
+  return result;
+}
+
 }  // namespace
 
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path) { return infos_of(read_vdb(path)); }
@@ -209,6 +225,16 @@ void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid,
   for (const auto& [key, value] : grid.metadata)
     if (key != length_unit_key) metadata.insertMeta(key, openvdb::StringMetadata(value));
   write_vdb(path, rows, metadata);
+}
+
+void write_scalar_vdb(const std::filesystem::path& path, const std::vector<ScalarGrid>& grids,
+                      const std::map<std::string, std::string>& metadata) {
+  openvdb::initialize();
+  openvdb::MetaMap of_file;
+  for (const auto& [key, value] : metadata) of_file.insertMeta(key, openvdb::StringMetadata(value));
+  openvdb::GridPtrVec all;
+  for (const ScalarGrid& grid : grids) all.push_back(float_grid(grid));
+  write_vdb(path, all, of_file);
 }
 
 }  // namespace tensorray

@@ -1,13 +1,15 @@
 #pragma once
 /// @file volumes/files/tensor_files.h
-/// Tensor fields in OpenVDB files. Only the .cpp file includes OpenVDB.
+/// Tensor fields, and grids of numbers, in OpenVDB files. Only the .cpp file includes OpenVDB.
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "volumes/files/grid_layouts.h"
 #include "volumes/grids/block_source.h"
+#include "volumes/grids/scalar_grid.h"
 
 namespace tensorray {
 
@@ -39,5 +41,11 @@ void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid,
 
 /// The grids of a file, in the file's order. @throw std::runtime_error as open_tensor_vdb.
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path);
+
+/// Writes each grid as an OpenVDB float grid (background 0) with its own metadata, and writes `metadata` on the file.
+/// Equal grids give equal bytes. Writes the file in place.
+/// @throw std::runtime_error naming the file and the reason, also when the disk is full.
+void write_scalar_vdb(const std::filesystem::path& path, const std::vector<ScalarGrid>& grids,
+                      const std::map<std::string, std::string>& metadata);
 
 }  // namespace tensorray

@@ -3,13 +3,25 @@
 /// Makes a field of blocks in one pass: each block is read, cleaned, preprocessed and placed in its bricks while it is
 /// in the processor's caches, without a grid in between.
 
+#include <cstddef>
 #include <optional>
 
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/tensors/eigenvalues.h"
-#include "volumes/tensors/resolution.h"
 
 namespace tensorray {
+
+/// How far linear and cubic interpolation differ in the middles of cells: ‖T_linear − T_cubic‖ (Frobenius) as a part of
+/// the root mean square of ‖T_cubic‖ there. Halving the voxels divides it by four where voxels resolve the field.
+struct Resolution {
+  std::size_t cells = 0;  ///< Number of cells that were compared; 0: none has eight active voxels.
+  double median = 0, percentile_99 = 0;
+};
+
+/// Above this, pictures depend on what was between the voxels and is not known: structures are about two voxels wide.
+constexpr double coarse = 0.1;
+
+inline bool is_coarse(const Resolution& resolution) { return resolution.percentile_99 > coarse; }
 
 struct MadeField {
   std::optional<TensorField> field;  ///< Nothing if no voxel is finite.

@@ -23,8 +23,8 @@ struct GridSettings {
 // The parameters of each generator: plain data with defaults. `describe`, below, names them for scene files,
 // command-line flags and metadata.
 
-/// A load on the half space z < 0 (load_stress.h): stress, tension positive. The load is at the centre of the face z =
-/// max.z + one voxel, so that the singular point of a point load is one voxel outside the grid.
+/// A load on the half space z < 0 (point_load_stress, disc_load_stress): stress, tension positive. The load is at the
+/// centre of the face z = max.z + one voxel, so that the singular point of a point load is one voxel outside the grid.
 struct PointLoad {
   double load = 1;             ///< Force pushing towards −z.
   double poisson_ratio = 0.3;  ///< In [-1, 0.5].
@@ -159,5 +159,17 @@ TensorGrid generate(const Generator& generator, const GridSettings& grid);
 
 /// The same, block by block.
 BlockSource generator_source(const Generator& generator, const GridSettings& grid);
+
+// The stress in an elastic half space under a load on its surface, in closed form. The material fills z < 0; the load
+// is about the origin, and pushes towards −z. Stress is tension positive, in force per area of the units of `load` and
+// `position`. Any thread may call these.
+
+/// Under a load on a point, at `position` (z <= 0, not the origin) (Boussinesq 1885; Timoshenko & Goodier, Theory of
+/// Elasticity, §138).
+Eigen::Matrix3d point_load_stress(const Eigen::Vector3d& position, double load, double poisson_ratio);
+
+/// Under a load on a disc of `radius` (> 0), pressed as by a sphere: 3 load / (2π radius²) · sqrt(1 − (r/radius)²) at
+/// the distance r from its middle (Hertz 1882; Huber 1904). At `position` (z <= 0). Far away, it is that of the point.
+Eigen::Matrix3d disc_load_stress(const Eigen::Vector3d& position, double load, double radius, double poisson_ratio);
 
 }  // namespace tensorray

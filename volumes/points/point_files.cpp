@@ -11,7 +11,6 @@
 #include "base/geometry/box.h"
 #include "volumes/points/vtk_files.h"
 #include "volumes/vdb/vdb_archive.h"
-#include "volumes/vdb/vdb_transform.h"
 
 namespace tensorray {
 namespace {

@@ -2,16 +2,36 @@
 /// @file volumes/points/vtk_files.h
 /// Points and polylines as VTK polydata (.vtp). Reading starts another program, `tensorray-import`, which contains VTK.
 /// Rendering therefore needs no VTK, and where VTK prints or ends the process because a file is damaged, the caller
-/// gets an exception. The programs exchange the data in a file without a name (poly_data.h).
+/// gets an exception.
 
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <set>
 #include <string>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
 
 #include "volumes/points/point_files.h"
-#include "volumes/points/poly_data.h"
 
 namespace tensorray {
+
+/// Values of `components` numbers each, one value after another, in the number type of the file.
+struct DataArray {
+  int components = 1;
+  std::variant<std::vector<double>, std::vector<float>, std::vector<std::int32_t>, std::vector<std::uint8_t>> values;
+};
+
+/// Polylines, and named values for their points and for themselves.
+struct PolylineData {
+  std::vector<Eigen::Vector3d> points;  ///< World: all of the first line, then those of the next one, ...
+  std::vector<std::size_t> line_ends;   ///< For each line: the number of points up to its end, earlier lines included.
+  std::map<std::string, DataArray> point_data, line_data;  ///< One value per point, and one value per line.
+  std::map<std::string, std::vector<std::string>> texts;   ///< Notes about the whole. Written, but not read.
+};
 
 /// Writes one vertex per point, the scalars and vectors as point data, and the metadata as string field data; in place,
 /// on all threads, and without VTK, which takes four times as long. Arrays are inline, in base64 and not compressed,
@@ -28,5 +48,15 @@ void write_vtp(const std::filesystem::path& path, const PolylineData& lines);
 /// @throw std::runtime_error with the reason (without the file): not VTK polydata, damaged or cut off, a line refers
 /// to a point that does not exist, the file announces more than memory holds; Cancelled.
 PolylineData read_vtp_lines(const std::filesystem::path& path, const std::set<std::string>& wanted);
+
+// The file without a name in which `tensorray-import` hands polylines to this program. Users never see it: its numbers
+// have the machine's byte order, and both programs must have the same version.
+
+/// Writes the file in place, without texts. All arrays are of doubles.
+/// @throw std::runtime_error with the reason (without the file) when the disk is full.
+void write_poly_lines(const std::filesystem::path& path, PolylineData lines);
+
+/// @throw std::runtime_error with the reason (without the file) if the file is of another kind or is cut off.
+PolylineData read_poly_lines(const std::filesystem::path& path);
 
 }  // namespace tensorray

@@ -189,4 +189,15 @@ double TensorSampler::way_through_straight_brick(const Eigen::Vector3d& world, c
   return std::isfinite(way) ? way : 0;
 }
 
+void sample_tensors(const TensorField& field, const IndexPoints& points, float factor, float* components,
+                    std::size_t stride) {
+  TensorSampler sampler(field);
+  const Eigen::Vector3d origin = (TensorBrick::cells * points.brick).cast<double>();
+  for (std::size_t p = 0; p < points.count; ++p) {
+    const Eigen::Vector3d from(points.position[0][p], points.position[1][p], points.position[2][p]);
+    const Eigen::Matrix3f T = factor * sampler.at(field.to_world() * (origin + from)).cast<float>();
+    for (std::size_t c = 0; c < 9; ++c) components[c * stride + p] = T.data()[c];
+  }
+}
+
 }  // namespace tensorray

@@ -1,8 +1,9 @@
 #pragma once
 /// @file volumes/sampling/tensor_sampler.h
-/// The tensor at a point, in double precision.
+/// The tensor at a point, in double precision; and at many points, in single precision, side by side.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include <Eigen/Geometry>
@@ -41,5 +42,23 @@ class TensorSampler {
   TensorBrick brick_{};
   std::uint64_t samples_ = 0;
 };
+
+/// Arrays have room for this count of points, as callers load and store vectors whole.
+constexpr std::size_t sampled_room(std::size_t count) { return (count + 15) / 16 * 16; }
+
+/// Points of index space. Single precision resolves 1e-7 of the distance from the brick.
+struct IndexPoints {
+  Eigen::Vector3i brick;     ///< Coordinates of a brick, in bricks.
+  const float* position[3];  ///< From its first voxel, in voxels: an array for each axis, with `sampled_room`.
+  std::size_t count;
+};
+
+/// Samples a field as TensorSampler does. Points outside the extent are moved to it. It is fastest if points next to
+/// each other are in the same brick. The tensor at a point does not depend on the other points.
+/// @param factor      All tensors are multiplied by it.
+/// @param components  Component i (column by column) of the tensor at point p becomes components[i * stride + p].
+/// @param stride      At least `sampled_room` of the count.
+void sample_tensors(const TensorField& field, const IndexPoints& points, float factor, float* components,
+                    std::size_t stride);
 
 }  // namespace tensorray

@@ -1,5 +1,3 @@
-#include "base/files/replace_file.h"
-
 #include <csignal>
 #include <fstream>
 #include <iterator>
@@ -8,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include "base/files/output_file.h"
 #include "base/text/content_hash.h"
 
 namespace tensorray {

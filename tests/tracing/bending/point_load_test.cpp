@@ -11,7 +11,7 @@
 
 #include "tests/data_folder.h"
 #include "tests/tracing/support.h"
-#include "volumes/making/load_stress.h"
+#include "volumes/making/generators.h"
 #include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {

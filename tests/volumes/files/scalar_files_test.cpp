@@ -1,7 +1,5 @@
 // Invariants of a field as float grids, read back by OpenVDB itself.
 
-#include "volumes/files/scalar_files.h"
-
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 

@@ -9,7 +9,6 @@
 
 #include "base/constants.h"
 #include "tests/volumes/grid_support.h"
-#include "volumes/making/load_stress.h"
 #include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {

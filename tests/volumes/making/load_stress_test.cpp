@@ -1,5 +1,3 @@
-#include "volumes/making/load_stress.h"
-
 #include <cmath>
 #include <functional>
 #include <vector>
@@ -7,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
+#include "volumes/making/generators.h"
 
 namespace tensorray {
 namespace {

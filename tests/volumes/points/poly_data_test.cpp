@@ -1,8 +1,7 @@
-#include "volumes/points/poly_data.h"
-
 #include <gtest/gtest.h>
 
 #include "tests/volumes/file_support.h"
+#include "volumes/points/vtk_files.h"
 
 namespace tensorray {
 namespace {

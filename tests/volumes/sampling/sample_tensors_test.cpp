@@ -1,4 +1,3 @@
-#include "volumes/sampling/sample_tensors.h"
 
 #include <array>
 #include <cmath>

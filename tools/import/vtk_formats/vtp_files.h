@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-#include "volumes/points/poly_data.h"
+#include "volumes/points/vtk_files.h"
 
 namespace tensorray {
 
