@@ -14,7 +14,7 @@
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
 #include "tracing/bending/light_channel.h"
-#include "volumes/grids/scalar_grid.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 
