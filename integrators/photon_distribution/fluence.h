@@ -11,7 +11,7 @@
 #include "tracing/bending/bending.h"
 #include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/tensor_field.h"
-#include "volumes/grids/scalar_grid.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 

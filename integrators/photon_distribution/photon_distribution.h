@@ -13,7 +13,7 @@
 #include "renderer/lights/beam.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
-#include "volumes/grids/scalar_grid.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 

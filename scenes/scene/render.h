@@ -19,7 +19,7 @@
 #include "renderer/light_maps/photon_counts.h"
 #include "tracing/bending/bending.h"
 #include "tracing/paths/paths.h"
-#include "volumes/grids/scalar_grid.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "volumes/grids/tensor_grid.h"
+#include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
 
@@ -44,6 +45,15 @@ inline void expect_same_blocks(const TensorGrid& a, const TensorGrid& b) {
     EXPECT_EQ(a.blocks[i].active, b.blocks[i].active);
     EXPECT_EQ(a.blocks[i].values, b.blocks[i].values);
   }
+}
+
+/// Preprocesses every voxel in place, as make_field does.
+inline EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
+  const Eigenvalues chosen = mode == Eigenvalues::automatic ? automatic_choice(asymmetry(grid)) : mode;
+  EigenvalueSums all;
+  if (chosen != Eigenvalues::raw)
+    for (TensorBlock& block : grid.blocks) all.add(apply_eigenvalues(block, chosen));
+  return report_of(all, chosen);
 }
 
 }  // namespace tensorray

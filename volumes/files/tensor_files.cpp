@@ -85,8 +85,7 @@ BlockSource derived_source(const std::filesystem::path& path, const std::vector<
                            const BlockSource& field) {
   SampleBlocks samples(field.shapes.size());
   tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
-    samples[i].origin = field.shapes[i].origin;
-    samples[i].active = field.shapes[i].active;
+    static_cast<BlockShape&>(samples[i]) = field.shapes[i];
     put_values(path, grids, samples[i]);
   });
   const bool is_staggered = grids.front().file.grid->getGridClass() == openvdb::GRID_STAGGERED;

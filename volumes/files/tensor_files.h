@@ -9,7 +9,6 @@
 
 #include "volumes/files/grid_layouts.h"
 #include "volumes/grids/block_source.h"
-#include "volumes/grids/scalar_grid.h"
 
 namespace tensorray {
 

@@ -1,7 +1,7 @@
 #pragma once
 /// @file volumes/grids/tensor_grid.h
-/// Tensors at the voxels of a sparse grid. Files hold it, generators make it, and preprocessing changes it. Tracing
-/// needs a TensorField, which is built from it.
+/// Tensors, or numbers, at the voxels of a sparse grid. Files hold them, generators make them, and preprocessing
+/// changes them. Tracing needs a TensorField, which is built from it.
 
 #include <array>
 #include <bitset>
@@ -65,6 +65,21 @@ struct TensorGrid {
   std::vector<BlockShape> shapes() const;  ///< Of all blocks, in their order.
   std::size_t active_voxels() const { return tensorray::active_voxels(shapes()); }
   Eigen::AlignedBox3i active_box() const { return tensorray::active_box(shapes()); }
+};
+
+/// Numbers at 8³ voxels, in the order of a TensorBlock. Inactive voxels hold zero.
+struct ScalarBlock : BlockShape {
+  std::array<float, TensorBlock::voxels> values{};
+};
+
+/// A sparse grid of numbers, computed from a tensor field, or from the light in it, for other programs. Plain data, as
+/// a TensorGrid.
+struct ScalarGrid {
+  std::string name;
+  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
+  std::deque<ScalarBlock> blocks;
+  bool fog = false;  ///< Whether values are a density that is zero in empty space (OpenVDB: fog volume).
+  std::map<std::string, std::string> metadata;
 };
 
 /// A dense grid: `value(index)` at every index of `box` (inclusive), all active.

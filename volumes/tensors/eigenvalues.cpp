@@ -4,10 +4,8 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
-#include <vector>
 
 #include <Eigen/Eigenvalues>
-#include <tbb/parallel_for.h>
 
 #include "volumes/tensors/eigenvalue_vectors.h"
 
@@ -209,17 +207,6 @@ EigenvalueReport report_of(const EigenvalueSums& sums, Eigenvalues chosen) {
 
 Eigenvalues automatic_choice(double asymmetry) {
   return asymmetry < symmetric_tolerance ? Eigenvalues::absolute : Eigenvalues::raw;
-}
-
-EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
-  const Eigenvalues chosen = mode == Eigenvalues::automatic ? automatic_choice(asymmetry(grid)) : mode;
-  if (chosen == Eigenvalues::raw) return report_of({}, chosen);
-  std::vector<EigenvalueSums> blocks(grid.blocks.size());
-  tbb::parallel_for(std::size_t{0}, blocks.size(),
-                    [&](std::size_t i) { blocks[i] = apply_eigenvalues(grid.blocks[i], chosen); });
-  EigenvalueSums all;  // Summed in the order of the blocks, so that the number of threads does not matter.
-  for (const EigenvalueSums& block : blocks) all.add(block);
-  return report_of(all, chosen);
 }
 
 Eigen::Vector3cd eigenvalues(const Matrix3d& tensor) {

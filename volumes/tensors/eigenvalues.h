@@ -57,9 +57,6 @@ EigenvalueReport report_of(const EigenvalueSums& sums, Eigenvalues chosen);
 /// What `automatic` means for a field with this asymmetry.
 Eigenvalues automatic_choice(double asymmetry);
 
-/// Preprocesses every voxel in place, on all threads. Voxels must be finite.
-EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode);
-
 /// The eigenvalues of a tensor, sorted by falling real part. They are exactly real if the tensor is symmetric.
 Eigen::Vector3cd eigenvalues(const Eigen::Matrix3d& tensor);
 

@@ -3,7 +3,6 @@
 /// Tensors derived from vectors or scalars at the voxels of a sparse grid.
 
 #include <array>
-#include <bitset>
 #include <deque>
 
 #include <Eigen/Core>
@@ -13,9 +12,7 @@
 namespace tensorray {
 
 /// Vectors at 8³ voxels, or scalars in the first component. Voxels are in the order of TensorBlock.
-struct SampleBlock {
-  Eigen::Vector3i origin = Eigen::Vector3i::Zero();
-  std::bitset<TensorBlock::voxels> active;
+struct SampleBlock : BlockShape {
   std::array<Eigen::Vector3d, TensorBlock::voxels> values;
 
   SampleBlock() { values.fill(Eigen::Vector3d::Zero()); }

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "volumes/grids/scalar_grid.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 

@@ -11,6 +11,7 @@
 
 #include "tests/data_folder.h"
 #include "tests/tracing/support.h"
+#include "tests/volumes/grid_support.h"
 #include "volumes/making/generators.h"
 #include "volumes/tensors/eigenvalues.h"
 

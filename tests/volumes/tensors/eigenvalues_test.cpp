@@ -10,6 +10,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "tests/volumes/grid_support.h"
+
 namespace tensorray {
 namespace {
 
