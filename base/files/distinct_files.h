@@ -14,8 +14,7 @@ struct NamedFile {
   std::string name;            ///< How an error names the file: "`/field/file`", "--stats".
 };
 
-/// Whether a path leads to what is neither a file nor a folder: a pipe, a device or a socket. To open it may take for
-/// ever.
+/// Whether a path leads to what is neither a file nor a folder: a pipe, a device or a socket. Opening it may never end.
 bool is_device(const std::filesystem::path& path);
 
 /// Compares files by device and inode, after following links. A file that does not exist yet is compared by its folder

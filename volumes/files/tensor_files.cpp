@@ -133,9 +133,8 @@ class RowGrid : public openvdb::Vec3SGrid {
 
   /// The format: the buffers of all leaves, in their order in the tree.
   void writeBuffers(std::ostream& file) const override {
-    for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf) {
+    for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf)
       filled(*blocks_.at(&*leaf)).writeBuffers(file, saveFloatAsHalf());
-    }
   }
 
  private:
