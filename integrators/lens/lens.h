@@ -18,7 +18,9 @@
 #include "base/process/progress.h"
 #include "integrators/lens/lens_map.h"
 #include "renderer/film/film.h"
+#include "renderer/images/image.h"
 #include "renderer/textures/texture.h"
+#include "tracing/bending/geometry.h"
 #include "tracing/bending/light_channel.h"
 #include "tracing/flow/flow_map.h"
 
@@ -151,5 +153,13 @@ LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const B
 /// it.
 LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance,
                       std::size_t channels, bool by_channel, const Progress& progress);
+
+/// Adds the obstacles between the receiver and the plane of the image to a picture with the receiver's resolution,
+/// where its alpha is less than 1: as the viewer sees them straight along its lines of sight, by light that comes from
+/// there.
+/// @param surfaces  Their obstacles are drawn. @param samples  Of a pixel along x and along y.
+/// @param image  Its first channels are R, G and B, multiplied by alpha, and A.
+/// @throw std::runtime_error if Embree fails.
+void draw_obstacles(const Surfaces& surfaces, const LensSetup& setup, int samples, Image& image);
 
 }  // namespace tensorray

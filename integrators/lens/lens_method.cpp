@@ -8,8 +8,6 @@
 
 #include "base/constants.h"
 #include "integrators/lens/lens.h"
-#include "integrators/lens/lens_obstacles.h"
-#include "integrators/lens/load_lens.h"
 #include "renderer/charts/grid_lines.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"

@@ -1,9 +1,9 @@
-#include "integrators/lens/lens_obstacles.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include <tbb/parallel_for.h>
+
+#include "integrators/lens/lens.h"
 
 namespace tensorray {
 namespace {

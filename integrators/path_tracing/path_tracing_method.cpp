@@ -9,7 +9,6 @@
 #include "integrators/path_files/path_files.h"
 #include "integrators/path_tracing/context_surfaces.h"
 #include "integrators/path_tracing/path_colors.h"
-#include "integrators/path_tracing/path_surfaces.h"
 #include "integrators/path_tracing/stage.h"
 #include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"

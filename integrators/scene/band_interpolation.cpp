@@ -1,9 +1,8 @@
-#include "integrators/scene/band_interpolation.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "base/constants.h"
+#include "integrators/scene/field_region.h"
 
 namespace tensorray {
 namespace {

@@ -5,7 +5,6 @@
 
 #include "integrators/path_tracing/context_surfaces.h"
 #include "integrators/path_tracing/path_colors.h"
-#include "integrators/path_tracing/path_surfaces.h"
 #include "renderer/lights/lights.h"
 
 namespace tensorray {

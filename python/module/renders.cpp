@@ -18,7 +18,6 @@
 #include "scenes/jobs/origin.h"
 #include "scenes/jobs/work_file.h"
 #include "scenes/outputs/picture_outputs.h"
-#include "scenes/outputs/statistics_json.h"
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
 

@@ -19,17 +19,13 @@ namespace {
 
 void check_wavelengths(const LightDescription& light, const SceneSource& source) {
   const double min = light.wavelength_min, max = light.wavelength_max;
-  if (min > max) {
-    source.fail(fmt::format("`/light/wavelengths/min` ({} nm) must not be above `max` ({} nm)", min, max));
-  }
-  if (min == max && light.wavelength_count > 1) {
+  if (min > max) source.fail(fmt::format("`/light/wavelengths/min` ({} nm) must not be above `max` ({} nm)", min, max));
+  if (min == max && light.wavelength_count > 1)
     source.fail(fmt::format("`/light/wavelengths/count` must be 1, but is {}: `min` and `max` are the same wavelength",
                             light.wavelength_count));
-  }
-  if (light.wavelengths_per_photon > 0 && light.wavelength_count % light.wavelengths_per_photon != 0) {
+  if (light.wavelengths_per_photon > 0 && light.wavelength_count % light.wavelengths_per_photon != 0)
     source.fail(fmt::format("`/light/wavelengths/per_photon` must divide `count` ({}), but is {}",
                             light.wavelength_count, light.wavelengths_per_photon));
-  }
 }
 
 /// s(λ) < 0 is allowed and bends light the other way. Usually it is a mistake: the range of wavelengths is too wide.

@@ -18,17 +18,33 @@
 
 #include "renderer/camera/camera.h"
 #include "renderer/lights/beam.h"
+#include "renderer/spectra/spectrum.h"
 #include "renderer/textures/test_images.h"
 #include "scenes/description/material_description.h"
 #include "scenes/description/method.h"
-#include "scenes/description/spectrum_description.h"
 #include "scenes/keys/generate_grid.h"
+#include "scenes/keys/values.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/flexibility.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
+
+struct Illuminant {
+  std::string name = "D65";  ///< One of `illuminant_names`.
+};
+
+struct BlackBody {
+  double kelvin = 0;  ///< 100 to 1e9.
+};
+
+using SpectrumDescription = std::variant<Illuminant, BlackBody, std::filesystem::path>;
+
+TENSORRAY_VALUE(SpectrumDescription);
+
+/// @throw std::runtime_error naming the file that cannot be read.
+Spectrum load_spectrum(const SpectrumDescription& description);
 
 /// What cubic interpolation takes inactive voxels for (Border); `automatic`: `extend` where obstacles or bounds are
 /// given, which stop light at the body that the active voxels are, else `fade`.

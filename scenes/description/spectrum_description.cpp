@@ -1,10 +1,9 @@
-#include "scenes/description/spectrum_description.h"
-
 #include <algorithm>
 #include <vector>
 
 #include "base/text/parse_number.h"
 #include "base/text/text.h"
+#include "scenes/description/description.h"
 
 namespace tensorray {
 namespace {

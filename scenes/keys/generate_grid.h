@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "scenes/keys/limits.h"
+#include "scenes/keys/values.h"
 #include "volumes/making/generators.h"
 
 namespace tensorray {

@@ -1,7 +1,7 @@
 #pragma once
 /// @file scenes/keys/key_visitor.h
 /// Tables of keys. `describe(keys, visit)` of a struct shows each of its keys to a visitor: the reader
-/// (section_reader.h) or the schema writer (schema_writer.h), which so agree.
+/// (SectionReader) or the schema writer (SchemaWriter), which so agree.
 
 #include <filesystem>
 #include <functional>
@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "scenes/keys/scene_source.h"
+#include "scenes/keys/json_reader.h"
 #include "scenes/keys/values.h"
 
 namespace tensorray {

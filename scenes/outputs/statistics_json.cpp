@@ -1,5 +1,3 @@
-#include "scenes/outputs/statistics_json.h"
-
 #include <cstdint>
 #include <numeric>
 
@@ -7,6 +5,7 @@
 #include <sys/resource.h>
 
 #include "base/text/path_text.h"
+#include "scenes/outputs/write_outputs.h"
 
 namespace tensorray {
 namespace {

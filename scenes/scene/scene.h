@@ -3,11 +3,13 @@
 /// Everything that a render needs. Immutable after loading.
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/process/progress.h"
 #include "renderer/color/color.h"
 #include "renderer/lights/beam.h"
 #include "renderer/spectra/spectrum.h"
@@ -114,5 +116,10 @@ bool has_white(const Scene& scene);
 
 /// Matrix from XYZ to the working space. The white of the light becomes neutral if the scene asks for white balance.
 Eigen::Matrix3d to_working(const Scene& scene);
+
+/// The field of a scene. Where memory has a bound, processes of one user on one machine that want the same field have
+/// one copy of its bricks: the first one loads it, and the others wait, and map its file.
+/// @param key  Of the field, and of the program. @throw what `load` throws; Cancelled.
+LoadedField share_field(const std::string& key, const std::function<LoadedField()>& load, const Progress& progress);
 
 }  // namespace tensorray

@@ -16,7 +16,6 @@
 #include "renderer/images/image.h"
 #include "scenes/description/run_files.h"
 #include "scenes/keys/json_reader.h"
-#include "scenes/keys/scene_source.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"

@@ -16,7 +16,6 @@
 #include "renderer/images/image.h"
 #include "scenes/jobs/origin.h"
 #include "scenes/keys/json_reader.h"
-#include "scenes/outputs/statistics_json.h"
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
