@@ -11,10 +11,9 @@
 #include "renderer/charts/grid_lines.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"
-#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
-#include "scenes/scene/fine_bands.h"
+#include "scenes/scene/scene.h"
 
 namespace tensorray {
 namespace {

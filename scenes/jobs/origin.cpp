@@ -1,12 +1,11 @@
-#include "scenes/jobs/origin.h"
-
 #include <algorithm>
 #include <set>
 
 #include <fmt/format.h>
 
 #include "base/text/content_hash.h"
-#include "scenes/description/run_files.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/jobs/work_file.h"
 #include "scenes/keys/values.h"
 
 namespace tensorray {

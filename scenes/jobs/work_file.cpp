@@ -14,7 +14,6 @@
 #include "base/text/content_hash.h"
 #include "base/text/path_text.h"
 #include "base/text/text.h"
-#include "scenes/jobs/origin.h"
 
 // The file: the mark; an archive of the header, as JSON, and of the name and the size of each result; the results; the
 // hash of all this.

@@ -1,4 +1,4 @@
-#include "scenes/outputs/annotations.h"
+#include "renderer/charts/annotations.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -7,9 +7,9 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
-#include "renderer/charts/annotations.h"
 #include "renderer/color/color.h"
 #include "renderer/spectra/spectrum.h"
+#include "scenes/outputs/picture_outputs.h"
 
 namespace tensorray {
 namespace {

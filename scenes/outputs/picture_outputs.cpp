@@ -7,7 +7,6 @@
 #include <fmt/ranges.h>
 
 #include "base/text/path_text.h"
-#include "scenes/outputs/annotations.h"
 #include "volumes/files/scalar_files.h"
 
 namespace tensorray {

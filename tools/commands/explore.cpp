@@ -14,7 +14,7 @@
 #include "integrators/methods/read_scene.h"
 #include "renderer/charts/lettering.h"
 #include "renderer/images/image.h"
-#include "scenes/description/run_files.h"
+#include "scenes/description/check_scene.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/render.h"

@@ -14,7 +14,7 @@
 #include "base/text/numbered_name.h"
 #include "base/text/text.h"
 #include "renderer/images/image.h"
-#include "scenes/jobs/origin.h"
+#include "scenes/jobs/work_file.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
