@@ -195,15 +195,10 @@ std::vector<NamedFile> input_files(const SceneDescription& scene) {
   return files;
 }
 
-std::vector<NamedFile> output_files(const SceneDescription& scene) {
-  std::vector<NamedFile> files;
-  for (const auto& [key, file] : scene.output.files) files.push_back({file, "`/output/" + key + "`"});
-  return files;
-}
-
 void check_files(const SceneDescription& scene, const std::vector<NamedFile>& more,
                  const std::vector<NamedFile>& read) {
-  std::vector<NamedFile> outputs = output_files(scene);
+  std::vector<NamedFile> outputs;
+  for (const auto& [key, file] : scene.output.files) outputs.push_back({file, "`/output/" + key + "`"});
   outputs.insert(outputs.end(), more.begin(), more.end());
   try {
     std::vector<NamedFile> inputs = input_files(scene);

@@ -21,7 +21,6 @@
 #include "renderer/spectra/spectrum.h"
 #include "renderer/textures/test_images.h"
 #include "scenes/description/method.h"
-#include "scenes/keys/generate_grid.h"
 #include "scenes/keys/key_visitor.h"
 #include "scenes/keys/values.h"
 #include "tracing/bending/bending.h"

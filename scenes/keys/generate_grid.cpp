@@ -1,10 +1,10 @@
-#include "scenes/keys/generate_grid.h"
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include <fmt/core.h>
+
+#include "scenes/keys/key_visitor.h"
 
 namespace tensorray {
 namespace {

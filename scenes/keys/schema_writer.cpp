@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <variant>
 
-#include "scenes/keys/generate_grid.h"
+#include "scenes/keys/key_visitor.h"
 #include "scenes/keys/section_reader.h"
 
 namespace tensorray {

@@ -8,7 +8,7 @@
 
 #include <fmt/core.h>
 
-#include "scenes/keys/generate_grid.h"
+#include "scenes/keys/key_visitor.h"
 
 namespace tensorray {
 namespace {

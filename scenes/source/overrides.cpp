@@ -4,11 +4,9 @@
 #include <cstddef>
 #include <vector>
 
-#include <fmt/core.h>
 #include <fmt/format.h>
 
 #include "base/text/path_text.h"
-#include "scenes/keys/json_reader.h"
 #include "scenes/keys/values.h"
 
 namespace tensorray {
