@@ -1,8 +1,7 @@
-#include "integrators/lens/lens_map.h"
-
 #include <algorithm>
 #include <numeric>
 
+#include "integrators/lens/lens.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {

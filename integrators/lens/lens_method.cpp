@@ -8,15 +8,12 @@
 
 #include "base/constants.h"
 #include "integrators/lens/lens.h"
-#include "integrators/lens/lens_obstacles.h"
-#include "integrators/lens/load_lens.h"
 #include "renderer/charts/grid_lines.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"
-#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
-#include "scenes/scene/fine_bands.h"
+#include "scenes/scene/scene.h"
 
 namespace tensorray {
 namespace {

@@ -13,9 +13,11 @@
 #include <Eigen/Core>
 
 #include "integrators/lens/lens.h"
+#include "renderer/surfaces/plate.h"
 #include "renderer/textures/test_images.h"
 #include "renderer/textures/texture.h"
 #include "scenes/description/method.h"
+#include "scenes/scene/scene.h"
 
 namespace tensorray {
 
@@ -99,5 +101,16 @@ inline void describe(LensDescription& lens, KeyVisitor& visit) {
 }
 
 std::shared_ptr<Method> lens_method();
+
+/// The viewer looks against the light, so that the normals of both rectangles point along the light.
+struct LensScene {
+  Texture image;
+  Plate receiver;
+  std::vector<Plate> planes;  ///< Planes of the image. Each gives a picture; they are side by side.
+  bool wraps = false;         ///< Whether the image continues beyond its edges.
+};
+
+/// @throw std::runtime_error if the image cannot be read; SceneError if the image would be behind the receiver.
+LensScene load_lens(const Scene& scene, const LensDescription& lens, std::vector<std::string>& notes);
 
 }  // namespace tensorray

@@ -1,11 +1,10 @@
-#include "integrators/lens/load_lens.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "integrators/lens/lens_method.h"
 #include "renderer/textures/test_images.h"
 
 namespace tensorray {

@@ -9,7 +9,6 @@
 #include "base/text/text.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/description/scene_keys.h"
-#include "scenes/keys/schema_writer.h"
 #include "scenes/keys/section_reader.h"
 #include "scenes/source/frames.h"
 #include "scenes/source/overrides.h"

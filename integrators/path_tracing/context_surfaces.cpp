@@ -1,5 +1,3 @@
-#include "integrators/path_tracing/context_surfaces.h"
-
 #include <algorithm>
 #include <cmath>
 
@@ -8,6 +6,7 @@
 #include "base/constants.h"
 #include "base/process/job.h"
 #include "integrators/path_tracing/path_tracing_method.h"
+#include "integrators/path_tracing/stage.h"
 #include "integrators/photon_distribution/plate_light.h"
 #include "renderer/charts/colormap.h"
 #include "renderer/color/color.h"

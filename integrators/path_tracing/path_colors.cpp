@@ -7,7 +7,7 @@
 
 #include "integrators/path_tracing/path_tracing_method.h"
 #include "renderer/charts/color_bar.h"
-#include "scenes/outputs/annotations.h"
+#include "scenes/outputs/picture_outputs.h"
 #include "volumes/tensors/invariants.h"
 
 namespace tensorray {

@@ -1,5 +1,3 @@
-#include "integrators/path_tracing/path_surfaces.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -7,6 +5,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "integrators/path_tracing/path_colors.h"
 #include "renderer/color/color.h"
 #include "renderer/meshes/mesh.h"
 #include "tracing/paths/cross_section.h"

@@ -7,13 +7,10 @@
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
 #include "integrators/path_files/path_files.h"
-#include "integrators/path_tracing/context_surfaces.h"
 #include "integrators/path_tracing/path_colors.h"
-#include "integrators/path_tracing/path_surfaces.h"
 #include "integrators/path_tracing/stage.h"
 #include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"
-#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "tracing/paths/paths.h"
 

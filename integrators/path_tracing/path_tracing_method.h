@@ -18,7 +18,7 @@
 #include "renderer/spectra/spectrum.h"
 #include "renderer/surfaces/tube_mesh.h"
 #include "scenes/description/choices.h"
-#include "scenes/description/material_description.h"
+#include "scenes/description/description.h"
 #include "scenes/description/method.h"
 #include "volumes/tensors/invariants.h"
 

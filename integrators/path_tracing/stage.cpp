@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "integrators/path_tracing/context_surfaces.h"
 #include "scenes/outputs/channel_table.h"
 
 namespace tensorray {

@@ -3,7 +3,9 @@
 /// What all pictures of surfaces share: camera and lights (studio.cpp), the settings of the path tracer, visible lamps,
 /// and the channels of the picture.
 
+#include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,5 +51,22 @@ RenderCallbacks render_callbacks(const Progress& progress, RenderJob* job, const
 /// Adds the area lights as surfaces, so that they are visible.
 void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
                std::vector<Material>& materials);
+
+class Job;
+
+/// Makes a material from its description, for the bands of the light that shows the paths.
+/// @throw std::invalid_argument if a metal is unknown.
+Material load_material(const MaterialDescription& description, const ShownLight& light);
+
+/// A mesh as a surface that is shaded with its normals.
+/// @param smooth_angle  As of ObjectDescription. @throw as read_mesh.
+ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle = {});
+
+/// Adds the scene's context to `surfaces`, and the materials that it needs to `materials`.
+/// @param job  Whose ranks make the light on the plate together, and which keeps it; null: alone.
+/// @throw SceneError if a slice or an isosurface is empty; Cancelled (light is traced for the plate); as
+/// Ranks::all_gather.
+void add_context(const Scene& scene, const PathScene& paths, Job* job, const Progress& progress,
+                 std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials);
 
 }  // namespace tensorray

@@ -11,7 +11,7 @@
 #include "integrators/photon_distribution/photon_distribution_method.h"
 #include "integrators/photon_distribution/plate_light.h"
 #include "renderer/film/spectral_image.h"
-#include "scenes/scene/fine_bands.h"
+#include "scenes/scene/scene.h"
 #include "tracing/flow_drawing/caustic.h"
 
 namespace tensorray {

@@ -9,7 +9,6 @@
 #include "base/process/seconds.h"
 #include "integrators/photon_distribution/plate_light.h"
 #include "scenes/description/check_scene.h"
-#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"

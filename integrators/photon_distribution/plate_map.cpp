@@ -4,7 +4,7 @@
 
 #include "integrators/photon_distribution/plate_light.h"
 #include "scenes/outputs/channel_table.h"
-#include "scenes/scene/fine_bands.h"
+#include "scenes/scene/scene.h"
 #include "tracing/flow_drawing/flow_view.h"
 
 namespace tensorray {

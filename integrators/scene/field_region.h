@@ -1,23 +1,46 @@
 #pragma once
 /// @file integrators/scene/field_region.h
 /// A tensor field in the view of a camera. Light is followed backwards, by Eq. 5 with −s. If there are no obstacles,
-/// some ways that allow a tolerance are interpolated (band_interpolation.h). The traced ways of their group must leave
+/// some ways that allow a tolerance are interpolated (BandGroup). The traced ways of their group must leave
 /// the volume through the same face of its box.
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>
 
 #include <tbb/enumerable_thread_specific.h>
 
-#include "integrators/scene/band_interpolation.h"
 #include "renderer/lights/bending_region.h"
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
 
 namespace tensorray {
+
+/// Ways [first, first + count) of a list, in the order of their bands: those of one ray. Almost everywhere, the way of
+/// light is a smooth function of its wavelength. A Lagrange polynomial through Chebyshev nodes is used if one more
+/// traced band agrees with it.
+struct BandGroup {
+  std::size_t first = 0, count = 0;
+  std::vector<std::size_t> nodes;  ///< Indices of the ways that interpolation is made of; ascending.
+  std::size_t check = 0;           ///< Index of the way that it must agree with.
+
+  bool is_traced(std::size_t way) const;  ///< Whether the way is a node or the check.
+};
+
+/// The groups in which ways may be interpolated: 6 or more neighbours that start alike and allow a `tolerance`. Fewer
+/// would gain too little.
+std::vector<BandGroup> interpolation_groups(const std::vector<BentRay>& ways);
+
+/// Whether the nodes predict the check: its direction within its tolerance, its position within the tolerance as seen
+/// from `start`, and its jacobian within 1%. All of these ways must have been traced, and must arrive.
+/// @param start  Where the ways of the group started.
+bool is_predictable(const BandGroup& group, const std::vector<BentRay>& ways, const Eigen::Vector3d& start);
+
+/// Sets position, direction, jacobian and `arrives` of the ways that were not traced.
+void interpolate(const BandGroup& group, std::vector<BentRay>& ways);
 
 /// What stays constant along light in the field. Each choice is consistent; they are different models of the medium.
 enum class Conserve {

@@ -1,11 +1,9 @@
-#include "integrators/scene/objects.h"
-
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/path_tracing/context_surfaces.h"
 #include "integrators/path_tracing/path_colors.h"
-#include "integrators/path_tracing/path_surfaces.h"
+#include "integrators/path_tracing/stage.h"
+#include "integrators/scene/field_light.h"
 #include "renderer/lights/lights.h"
 
 namespace tensorray {

@@ -12,10 +12,8 @@
 #include "integrators/path_tracing/stage.h"
 #include "integrators/scene/field_light.h"
 #include "integrators/scene/field_region.h"
-#include "integrators/scene/objects.h"
 #include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"
-#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/picture_outputs.h"
 
 namespace tensorray {

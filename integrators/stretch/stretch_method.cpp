@@ -11,7 +11,6 @@
 #include "renderer/charts/color_bar.h"
 #include "renderer/charts/colormap.h"
 #include "scenes/description/check_scene.h"
-#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
 

@@ -16,7 +16,7 @@
 #include "base/text/text.h"
 #include "python/module/work.h"
 #include "renderer/images/image.h"
-#include "scenes/keys/scene_source.h"
+#include "scenes/keys/json_reader.h"
 
 namespace tensorray {
 namespace {

@@ -13,10 +13,8 @@
 #include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
-#include "scenes/jobs/origin.h"
 #include "scenes/jobs/work_file.h"
 #include "scenes/outputs/picture_outputs.h"
-#include "scenes/outputs/statistics_json.h"
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
 

@@ -18,7 +18,7 @@
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "renderer/meshes/mesh.h"
-#include "scenes/scene/fine_bands.h"
+#include "scenes/scene/scene.h"
 #include "tracing/flow/flow_map.h"
 #include "tracing/trace/trace.h"
 #include "volumes/making/smoothing.h"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdlib>
 #include <set>
 #include <string>
 
@@ -12,24 +13,19 @@
 #include "base/text/path_text.h"
 #include "base/text/text.h"
 #include "renderer/color/color.h"
-#include "scenes/description/run_files.h"
 
 namespace tensorray {
 namespace {
 
 void check_wavelengths(const LightDescription& light, const SceneSource& source) {
   const double min = light.wavelength_min, max = light.wavelength_max;
-  if (min > max) {
-    source.fail(fmt::format("`/light/wavelengths/min` ({} nm) must not be above `max` ({} nm)", min, max));
-  }
-  if (min == max && light.wavelength_count > 1) {
+  if (min > max) source.fail(fmt::format("`/light/wavelengths/min` ({} nm) must not be above `max` ({} nm)", min, max));
+  if (min == max && light.wavelength_count > 1)
     source.fail(fmt::format("`/light/wavelengths/count` must be 1, but is {}: `min` and `max` are the same wavelength",
                             light.wavelength_count));
-  }
-  if (light.wavelengths_per_photon > 0 && light.wavelength_count % light.wavelengths_per_photon != 0) {
+  if (light.wavelengths_per_photon > 0 && light.wavelength_count % light.wavelengths_per_photon != 0)
     source.fail(fmt::format("`/light/wavelengths/per_photon` must divide `count` ({}), but is {}",
                             light.wavelength_count, light.wavelengths_per_photon));
-  }
 }
 
 /// s(λ) < 0 is allowed and bends light the other way. Usually it is a mistake: the range of wavelengths is too wide.
@@ -172,6 +168,45 @@ const Method& IntegratorDescription::method() const {
   for (const auto& method : methods)
     if (method->name() == type.value) return *method;
   throw std::logic_error("no method is chosen");
+}
+
+std::vector<NamedFile> input_files(const SceneDescription& scene) {
+  std::vector<NamedFile> files;
+  if (!is_device(scene.path)) files.push_back({scene.path, "the scene file"});  // A scene may come through a pipe.
+  files.push_back({scene.field.file, "`/field/file`"});
+  files.push_back({scene.field.bounds, "`/field/bounds`"});
+  const char* const environment = std::getenv("OCIO");  // It counts only where the scene names no config.
+  const bool is_own = !scene.output.ocio.empty();
+  const std::string config = is_own ? scene.output.ocio : environment ? environment : "";
+  if (!is_library_config(config)) files.push_back({config, is_own ? "`/output/ocio`" : "$OCIO"});
+  if (const auto* spectrum = std::get_if<std::filesystem::path>(&scene.light.spectrum))
+    files.push_back({*spectrum, "`/light/spectrum`"});
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i)
+    files.push_back({scene.obstacles[i], fmt::format("`/obstacles/{}/file`", i)});
+  for (std::size_t i = 0; i < scene.lights.size(); ++i)
+    files.push_back({scene.lights[i].file, fmt::format("`/lights/{}/file`", i)});
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    files.push_back({scene.objects[i].file, fmt::format("`/objects/{}/file`", i)});
+    if (const auto* picture = std::get_if<std::filesystem::path>(&scene.objects[i].texture))
+      files.push_back({*picture, fmt::format("`/objects/{}/texture`", i)});
+  }
+  for (const auto& method : scene.integrator.methods)
+    for (NamedFile& file : method->inputs()) files.push_back(std::move(file));
+  return files;
+}
+
+void check_files(const SceneDescription& scene, const std::vector<NamedFile>& more,
+                 const std::vector<NamedFile>& read) {
+  std::vector<NamedFile> outputs;
+  for (const auto& [key, file] : scene.output.files) outputs.push_back({file, "`/output/" + key + "`"});
+  outputs.insert(outputs.end(), more.begin(), more.end());
+  try {
+    std::vector<NamedFile> inputs = input_files(scene);
+    inputs.insert(inputs.end(), read.begin(), read.end());
+    require_distinct_files(inputs, outputs);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(printable(scene.path.string() + ": " + error.what()));
+  }
 }
 
 }  // namespace tensorray

@@ -2,6 +2,7 @@
 /// @file scenes/description/check_scene.h
 /// Checks rules between several values of a scene file. The limits of each single value are checked by the reader.
 
+#include "base/files/distinct_files.h"
 #include "scenes/description/description.h"
 
 namespace tensorray {
@@ -39,5 +40,15 @@ int channel_count(const SceneDescription& scene);
 /// Refuses a spectral picture in RGB mode, whose light has no wavelengths.
 /// @throw SceneError if the scene has both `output.spectral` and `bending.rgb`.
 void check_spectral_output(const SceneDescription& scene, const SceneSource& source);
+
+// The files that a render of a scene reads and writes:
+
+/// The scene file, all input files that it names for any method, and the OCIO config of the environment ($OCIO).
+std::vector<NamedFile> input_files(const SceneDescription& scene);
+
+/// @param more  Further outputs of the run, in addition to those of the scene. @param read  Further inputs.
+/// @throw SceneError if an output is the same file as an input or as another output.
+void check_files(const SceneDescription& scene, const std::vector<NamedFile>& more = {},
+                 const std::vector<NamedFile>& read = {});
 
 }  // namespace tensorray

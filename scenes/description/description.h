@@ -18,16 +18,70 @@
 
 #include "renderer/camera/camera.h"
 #include "renderer/lights/beam.h"
+#include "renderer/spectra/spectrum.h"
 #include "renderer/textures/test_images.h"
-#include "scenes/description/material_description.h"
 #include "scenes/description/method.h"
-#include "scenes/description/spectrum_description.h"
-#include "scenes/keys/generate_grid.h"
+#include "scenes/keys/key_visitor.h"
+#include "scenes/keys/values.h"
 #include "tracing/bending/bending.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
+
+struct Illuminant {
+  std::string name = "D65";  ///< One of `illuminant_names`.
+};
+
+struct BlackBody {
+  double kelvin = 0;  ///< 100 to 1e9.
+};
+
+using SpectrumDescription = std::variant<Illuminant, BlackBody, std::filesystem::path>;
+
+TENSORRAY_VALUE(SpectrumDescription);
+
+/// @throw std::runtime_error naming the file that cannot be read.
+Spectrum load_spectrum(const SpectrumDescription& description);
+
+enum class MaterialKind { diffuse, principled, metal, glass };
+enum class Metal { gold, silver, copper, aluminium };
+
+struct MaterialDescription {
+  MaterialKind kind = MaterialKind::principled;
+  Eigen::Vector3d color{0.7, 0.7, 0.7};  ///< Used if the surface has no colours of its own; linear Rec. 709.
+  double roughness = 0.4;
+  double metallic = 0, specular = 0.5, clearcoat = 0;  ///< principled.
+  Metal metal = Metal::gold;                           ///< metal.
+  double index = 1.5;                                  ///< glass: index of refraction.
+};
+
+inline Choices<MaterialKind> choices(MaterialKind) {
+  return {{"diffuse", MaterialKind::diffuse},
+          {"principled", MaterialKind::principled},
+          {"metal", MaterialKind::metal},
+          {"glass", MaterialKind::glass}};
+}
+
+inline Choices<Metal> choices(Metal) {
+  return {{"gold", Metal::gold}, {"silver", Metal::silver}, {"copper", Metal::copper}, {"aluminium", Metal::aluminium}};
+}
+
+inline void describe(MaterialDescription& material, KeyVisitor& visit) {
+  visit("kind", material.kind, "kind of material");
+  visit("color", material.color, "colour of a surface without colours of its own, linear Rec. 709", between(0, 1));
+  visit("roughness", material.roughness, "roughness: 0 polished, 1 matt (not diffuse)", between(0, 1));
+  visit("metallic", material.metallic, "principled: share of metal: 0 plastic, 1 metal", between(0, 1));
+  visit("specular", material.specular, "principled: reflection of plastic, 0.5 is 4 %", between(0, 1));
+  visit("clearcoat", material.clearcoat, "principled: strength of the clear coat", between(0, 1));
+  visit("metal", material.metal, "metal: its kind");
+  visit("index", material.index, "glass: index of refraction", between(1.01, 5));
+  visit.only_for({"roughness"}, "kind", material.kind,
+                 {MaterialKind::principled, MaterialKind::metal, MaterialKind::glass});
+  visit.only_for({"metallic", "specular", "clearcoat"}, "kind", material.kind, {MaterialKind::principled});
+  visit.only_for({"metal"}, "kind", material.kind, {MaterialKind::metal});
+  visit.only_for({"index"}, "kind", material.kind, {MaterialKind::glass});
+}
 
 /// What cubic interpolation takes inactive voxels for (Border); `automatic`: `extend` where obstacles or bounds are
 /// given, which stop light at the body that the active voxels are, else `fade`.

@@ -8,7 +8,7 @@
 #include "renderer/spectra/spectrum.h"
 #include "scenes/description/choices.h"
 #include "scenes/description/description.h"
-#include "scenes/keys/limits.h"
+#include "scenes/keys/values.h"
 #include "volumes/making/smoothing.h"
 
 namespace tensorray {

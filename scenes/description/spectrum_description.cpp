@@ -1,9 +1,8 @@
-#include "scenes/description/spectrum_description.h"
-
 #include <algorithm>
 #include <vector>
 
 #include "base/text/text.h"
+#include "scenes/description/description.h"
 
 namespace tensorray {
 namespace {

@@ -1,15 +1,23 @@
 #include "scenes/jobs/work_file.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <set>
+#include <stdexcept>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "base/errors.h"
 #include "base/files/output_file.h"
 #include "base/text/content_hash.h"
 #include "base/text/path_text.h"
-#include "scenes/jobs/origin.h"
+#include "base/text/text.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/keys/values.h"
 
 // The file: the mark; an archive of the header, as JSON, and of the name and the size of each result; the results; the
 // hash of all this.
@@ -40,6 +48,46 @@ WorkFile from_header(const std::string& text) {
   if (!is_origin(work.origin) || work.part.index >= work.part.count || work.part.count > max_shards)
     throw SceneError("it belongs to no render");
   return work;
+}
+
+/// Adds the results of a shard to those of the others.
+void unite(const std::string& file, const WorkFile& shard, WorkFile& all) {
+  const auto fail = [&](const std::string& what) { throw std::invalid_argument(printable(file + ": " + what)); };
+  const std::string other = difference(shard.origin, all.origin);
+  if (!other.empty()) fail("is of another render than the first shard: " + other);
+  if (shard.part.count != all.part.count)
+    fail(fmt::format("is one of {} shards, the first one of {}", shard.part.count, all.part.count));
+  if (!shard.is_complete)
+    fail(fmt::format("is not complete; continue it with --shard {}/{} --resume", shard.part.index + 1,
+                     shard.part.count));
+  all.results.insert(shard.results.begin(), shard.results.end());
+}
+
+Json files_of(const SceneDescription& description) {
+  Json files = Json::object();
+  for (const NamedFile& file : input_files(description))
+    if (!file.path.empty() && file.path != description.path)
+      files[file.name] = fmt::format("{:016x}", file_hash(file.path));
+  return files;
+}
+
+std::string shown(const Json& value) { return value.is_null() ? "not given" : excerpt(value); }
+
+/// The pointer of the first value that differs, and both values; values of the same place are alike whatever the order
+/// of their keys.
+std::string scene_difference(const Json& there, const Json& here, const std::string& pointer) {
+  if (there.is_object() && here.is_object()) {
+    std::set<std::string> keys;
+    for (const Json* each : {&there, &here})
+      for (const auto& item : each->items()) keys.insert(item.key());
+    for (const std::string& key : keys) {
+      const std::string found =
+          scene_difference(there.value(key, Json()), here.value(key, Json()), pointer + "/" + key);
+      if (!found.empty()) return found;
+    }
+    return "";
+  }
+  return there == here ? "" : fmt::format("`{}` is {} there, {} here", pointer, shown(there), shown(here));
 }
 
 }  // namespace
@@ -110,6 +158,77 @@ WorkFile read_work(const std::filesystem::path& path) {
   }
   if (kept_hash != hash) fail(path, damaged);
   return work;
+}
+
+WorkFile read_shards(const std::vector<std::string>& files) {
+  WorkFile all;
+  std::map<std::size_t, std::string> names;
+  for (const std::string& file : files) {
+    const WorkFile shard = read_work(file);
+    if (names.empty()) all = shard;
+    const std::size_t index = shard.part.index;
+    unite(file, shard, all);
+    const auto [before, is_new] = names.emplace(index, file);
+    if (!is_new)
+      throw std::invalid_argument(printable(fmt::format("{} and {} are both shard {}/{}; name one of them",
+                                                        before->second, file, index + 1, all.part.count)));
+  }
+  std::vector<std::string> missing;
+  for (std::size_t i = 0; i < all.part.count; ++i)
+    if (names.count(i) == 0) missing.push_back(fmt::format("{}/{}", i + 1, all.part.count));
+  if (!missing.empty())
+    throw std::invalid_argument(fmt::format("missing {} {}: render with --shard, and name all files",
+                                            missing.size() > 1 ? "shards" : "shard", joined(missing)));
+  all.part.index = 0;
+  return all;
+}
+
+Json origin_of(const Scene& scene) {
+  const SceneDescription& description = scene.description;
+  Json json = parse_value(description.text);
+  json.erase("output");
+  if (description.output.fluence_bands) json["output"]["fluence_bands"] = true;  // It is no file, but a setting.
+  const Eigen::Vector3d direction = *description.light.direction;
+  return {{"version", TENSORRAY_VERSION},
+          {"method", description.integrator.method().name()},
+          {"scene", json},
+          {"scale", scene.scale.scale},
+          {"direction", {direction.x(), direction.y(), direction.z()}},
+          {"files", files_of(description)}};
+}
+
+bool is_origin(const Json& json) {
+  const auto has = [&](const char* key, bool (Json::*is_right)() const) {
+    return json.is_object() && json.contains(key) && (json.at(key).*is_right)();
+  };
+  const auto is_number = [](const Json& each) { return each.is_number(); };
+  return has("version", &Json::is_string) && has("method", &Json::is_string) && has("scene", &Json::is_object) &&
+         has("scale", &Json::is_number) && has("files", &Json::is_object) && has("direction", &Json::is_array) &&
+         json.at("direction").size() == 3 &&
+         std::all_of(json.at("direction").begin(), json.at("direction").end(), is_number);
+}
+
+std::string difference(const Json& there, const Json& here) {
+  for (const char* key : {"version", "method"})
+    if (there.value(key, Json()) != here.at(key))
+      return fmt::format("its {} is {}, not {}", key, shown(there.value(key, Json())), shown(here.at(key)));
+  const std::string scene = scene_difference(there.value("scene", Json()), here.at("scene"), "");
+  if (!scene.empty()) return scene;
+  const Json files = there.value("files", Json::object());
+  for (const auto& [name, hash] : here.at("files").items())
+    if (files.value(name, Json()) != hash) return fmt::format("the file {} has other contents", name);
+  for (const char* key : {"scale", "direction"})
+    if (there.value(key, Json()) != here.at(key))
+      return fmt::format("its {} is {}, not {}", key, shown(there.value(key, Json())), shown(here.at(key)));
+  return "";
+}
+
+void set_chosen(const Json& origin, SceneDescription& description) {
+  if (!description.field.scale) description.field.scale = origin.at("scale").get<double>();
+  if (description.light.direction) return;
+  const Json& direction = origin.at("direction");
+  description.light.direction =
+      Eigen::Vector3d(direction.at(0).get<double>(), direction.at(1).get<double>(), direction.at(2).get<double>());
 }
 
 }  // namespace tensorray

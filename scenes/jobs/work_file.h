@@ -8,11 +8,12 @@
 
 #include "base/process/job.h"
 #include "scenes/keys/json_reader.h"
+#include "scenes/scene/scene.h"
 
 namespace tensorray {
 
 struct WorkFile {
-  Json origin;                       ///< What the results belong to; see origin.h.
+  Json origin;                       ///< What the results belong to; see origin_of.
   std::filesystem::path scene_file;  ///< Absolute. Paths in the scene are relative to its folder.
   WorkPart part;
   bool is_complete = false;  ///< Whether it has all results of its part.
@@ -30,5 +31,20 @@ WorkFile read_work(const std::filesystem::path& path);
 /// @throw std::invalid_argument naming shards that are missing, repeated, incomplete or of another render; as
 /// read_work.
 WorkFile read_shards(const std::vector<std::string>& files);
+
+/// The version of the program; the method; the scene with its changes, but without its output files; the scale and the
+/// direction of the light, which a scene may leave open; and the hash of each file that the scene reads.
+/// @throw std::runtime_error naming a file that cannot be read.
+Json origin_of(const Scene& scene);
+
+/// Whether a file's JSON has all that an origin has.
+bool is_origin(const Json& json);
+
+/// The first difference between two origins, as "`/camera/resolution` is [800,800] there, [400,400] here"; empty if
+/// there is none. @param there  Of a file. @param here  Of the scene that is loaded.
+std::string difference(const Json& there, const Json& here);
+
+/// Sets what a scene leaves open to what the origin has. The scene must be that of the origin.
+void set_chosen(const Json& origin, SceneDescription& description);
 
 }  // namespace tensorray

@@ -1,10 +1,10 @@
-#include "scenes/keys/generate_grid.h"
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include <fmt/core.h>
+
+#include "scenes/keys/key_visitor.h"
 
 namespace tensorray {
 namespace {
@@ -21,9 +21,8 @@ void check(const GridSettings& grid) {
   if (!(grid.max - grid.min).allFinite()) throw std::invalid_argument("`min` and `max` are too far apart");
   const Eigen::Vector3i& n = grid.resolution;
   if (n.minCoeff() < 1) throw std::invalid_argument("`resolution` must be at least 1 on every axis");
-  if (((grid.max - grid.min).array() == 0 && n.array() > 1).any()) {
+  if (((grid.max - grid.min).array() == 0 && n.array() > 1).any())
     throw std::invalid_argument("`resolution` must be 1 on an axis where `min` and `max` are equal");
-  }
   if (n.cast<double>().prod() > voxel_limit) {
     throw std::invalid_argument(
         fmt::format("`resolution` asks for {} x {} x {} voxels, more than 2^31; ask for fewer", n.x(), n.y(), n.z()));

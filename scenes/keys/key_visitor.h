@@ -1,7 +1,7 @@
 #pragma once
 /// @file scenes/keys/key_visitor.h
 /// Tables of keys. `describe(keys, visit)` of a struct shows each of its keys to a visitor: the reader
-/// (section_reader.h) or the schema writer (schema_writer.h), which so agree.
+/// (SectionReader) or the schema writer (SchemaWriter), which so agree.
 
 #include <filesystem>
 #include <functional>
@@ -12,12 +12,42 @@
 #include <variant>
 #include <vector>
 
-#include "scenes/keys/scene_source.h"
+#include <Eigen/Core>
+
+#include "scenes/keys/json_reader.h"
 #include "scenes/keys/values.h"
+#include "volumes/making/generators.h"
 
 namespace tensorray {
 
-struct GenerateDescription;
+/// `field.generate`.
+struct GenerateDescription {
+  Generator generator;
+  GridSettings grid;
+};
+
+/// The keys of the grid, in scene files (`field.generate`) and in `tensorray make`.
+struct GridRequest {
+  /// Voxels along the longest axis of the box (voxels are then cubes); or voxels along x, y and z.
+  std::variant<int, Eigen::Vector3i> resolution = 64;
+  std::optional<Eigen::Vector3d> min, max;  ///< Centres of the outermost voxels, world; none: the generator's.
+};
+
+constexpr int resolution_limit = 32768;       ///< Voxels along an axis.
+constexpr double voxel_limit = 2147483648.0;  ///< Voxels of a generated grid: 72 GiB of tensors.
+
+/// The keys of the grid; the generator has further keys.
+template <class Visitor>
+void describe(GridRequest& grid, Visitor& visit) {
+  visit("resolution", grid.resolution,
+        "voxels along the longest axis of the box (voxels are then cubes), or along x, y and z",
+        between(1, resolution_limit));
+  visit("min", grid.min, "least corner of the box, world; default: that of the kind");
+  visit("max", grid.max, "greatest corner of the box, world; default: that of the kind");
+}
+
+/// @throw std::invalid_argument that names the key: max below min, no voxel, too many voxels.
+GridSettings choose_grid(const Generator& generator, const GridRequest& request);
 
 /// The member of a struct that has the value of a key.
 class KeyMember {

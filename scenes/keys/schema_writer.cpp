@@ -1,9 +1,8 @@
-#include "scenes/keys/schema_writer.h"
-
 #include <algorithm>
 #include <variant>
 
-#include "scenes/keys/generate_grid.h"
+#include "scenes/keys/key_visitor.h"
+#include "scenes/keys/section_reader.h"
 
 namespace tensorray {
 

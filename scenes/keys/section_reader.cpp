@@ -8,7 +8,7 @@
 
 #include <fmt/core.h>
 
-#include "scenes/keys/generate_grid.h"
+#include "scenes/keys/key_visitor.h"
 
 namespace tensorray {
 namespace {
@@ -24,9 +24,8 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
       }
       const std::size_t replace = distance[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
       distance[i][j] = std::min({distance[i - 1][j] + 1, distance[i][j - 1] + 1, replace});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
         distance[i][j] = std::min(distance[i][j], distance[i - 2][j - 2] + 1);
-      }
     }
   }
   return distance[a.size()][b.size()];
@@ -133,9 +132,8 @@ void SectionReader::generator(const char* key, std::optional<GenerateDescription
   const Json* kind = inner.find("kind");
   if (!kind) source_.fail(fmt::format("`{}` needs the key `kind`: {}", pointer_to(key), kinds));
   const auto& known = generator_kinds();
-  if (!kind->is_string() || std::find(known.begin(), known.end(), kind->get<std::string>()) == known.end()) {
+  if (!kind->is_string() || std::find(known.begin(), known.end(), kind->get<std::string>()) == known.end())
     inner.refuse("kind", kinds);
-  }
 
   member.emplace();
   member->generator = generator_of(kind->get<std::string>());
@@ -178,9 +176,8 @@ void SectionReader::finish() const {
   }
   const auto given = std::count_if(alternatives_.begin(), alternatives_.end(),
                                    [this](const std::string& key) { return object_.contains(key); });
-  if (!alternatives_.empty() && given != 1) {
+  if (!alternatives_.empty() && given != 1)
     source_.fail(fmt::format("{} needs exactly one of {}", where, quoted_list(alternatives_, " and ")));
-  }
   for (const Stray& stray : strays_)
     source_.fail(fmt::format("`{}` has a meaning only where `{}` is {}, but that is \"{}\"; remove one of the two keys",
                              pointer_to(stray.key), pointer_to(stray.chooser), stray.allowed, stray.value));

@@ -2,10 +2,13 @@
 /// @file scenes/outputs/picture_outputs.h
 /// The pictures that every method can write, and the header entries of all files.
 
+#include <functional>
 #include <optional>
 #include <vector>
 
+#include "renderer/camera/camera.h"
 #include "renderer/images/image.h"
+#include "renderer/surfaces/plate.h"
 #include "scenes/description/method.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
@@ -34,5 +37,22 @@ ImageMetadata provenance(const Scene& scene, const Render& render);
 
 /// Writes Render::grids; for Output::write.
 void write_grids(const std::filesystem::path& file, const Scene& scene, const Render& render);
+
+/// The view of a picture whose pixels are those of a plate.
+PictureView picture_view(const Plate& plate);
+
+/// The view of a picture of a camera.
+PictureView picture_view(const Camera& camera);
+
+/// A legend of the light of a scene, for Render::draw_legend: its wavelengths (in RGB mode, its flexibilities) and the
+/// exposure.
+std::function<void(Image&, double exposure)> light_legend(const Scene& scene);
+
+/// Draws the caption, the scale bar and the axes that `output` asks for, if the picture has them.
+void draw_annotations(const OutputDescription& output, const Render& render, Image& image);
+
+/// The colour of light of one wavelength (nm) for the eye, linear Rec. 709, as saturated as a display can show it; grey
+/// if the eye does not see it.
+Eigen::Vector3d wavelength_color(double wavelength);
 
 }  // namespace tensorray

@@ -1,7 +1,7 @@
-#include "scenes/scene/fine_bands.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "scenes/scene/scene.h"
 
 namespace tensorray {
 

@@ -13,7 +13,6 @@
 #include "renderer/meshes/mesh.h"
 #include "scenes/description/choices.h"
 #include "scenes/scene/scene.h"
-#include "scenes/scene/shared_field.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/making/field_making.h"
 #include "volumes/making/smoothing.h"

@@ -3,11 +3,13 @@
 /// Everything that a render needs. Immutable after loading.
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/process/progress.h"
 #include "renderer/color/color.h"
 #include "renderer/lights/beam.h"
 #include "renderer/spectra/spectrum.h"
@@ -113,5 +115,38 @@ bool has_white(const Scene& scene);
 
 /// Matrix from XYZ to the working space. The white of the light becomes neutral if the scene asks for white balance.
 Eigen::Matrix3d to_working(const Scene& scene);
+
+/// The field of a scene. Where memory has a bound, processes of one user on one machine that want the same field have
+/// one copy of its bricks: the first one loads it, and the others wait, and map its file.
+/// @param key  Of the field, and of the program. @throw what `load` throws; Cancelled.
+LoadedField share_field(const std::string& key, const std::function<LoadedField()>& load, const Progress& progress);
+
+// The light of a scene as a continuum of wavelengths: narrow bands within its channels, in which light is bent as one.
+
+/// The flexibilities of a scene's light.
+struct LightRange {
+  std::vector<double> flexibilities;  ///< The two ends of a range, or those of red, green and blue.
+  bool is_range = false;
+};
+
+LightRange light_range(const Scene& scene);
+
+/// A narrow part of a channel. `begin` and `end` are places in the range of the light, from 0 to 1 (in RGB mode both
+/// are the channel's place: 0, ½ or 1).
+struct FineBand {
+  Band band;
+  double begin = 0, end = 0;
+  std::size_t channel = 0;
+  double weight = 1;  ///< Its part of the channel's power.
+};
+
+/// The channel that maps of the light describe: the one nearest to 550 nm, or green.
+std::size_t reference_channel(const Scene& scene);
+
+/// Its middle, as a place in the range of the light, from 0 to 1.
+double reference_place(const Scene& scene);
+
+/// @param count  Number of bands: a multiple of that of the channels. In RGB mode there is one band a channel.
+std::vector<FineBand> fine_bands(const Scene& scene, int count);
 
 }  // namespace tensorray

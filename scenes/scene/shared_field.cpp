@@ -1,5 +1,3 @@
-#include "scenes/scene/shared_field.h"
-
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -14,6 +12,7 @@
 #include "base/files/shared_file.h"
 #include "base/process/archive.h"
 #include "base/text/content_hash.h"
+#include "scenes/scene/scene.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {

@@ -98,6 +98,49 @@ void for_each_value(Json& json, const std::string& pointer, const Change& change
     for (std::size_t i = 0; i < json.size(); ++i) for_each_value(json[i], fmt::format("{}/{}", pointer, i), change);
 }
 
+const Json keyframes_reference = {{"$ref", "#/$defs/keyframes"}};
+
+Json keyframes_form() {
+  const Json number = {{"type", "number"}};
+  const Json value = {{"anyOf", {number, {{"type", "array"}, {"items", number}, {"minItems", 1}}}}};
+  const Json key = {{"type", "array"}, {"prefixItems", {number, value}}, {"items", false}, {"minItems", 2}};
+  return {{"description", "values at frames, for --frames: [frame, value], with increasing frames"},
+          {"type", "object"},
+          {"properties",
+           {{"keys", {{"type", "array"}, {"items", key}, {"minItems", 1}}},
+            {"ease",
+             {{"description", "how a value goes from one frame to the next"},
+              {"enum", {"linear", "smooth"}},
+              {"default", "linear"}}}}},
+          {"required", Json::array({"keys"})},
+          {"additionalProperties", false}};
+}
+
+/// Whether the schema is that of a number or of a list of numbers.
+bool is_of_numbers(const Json& schema) {
+  const Json type = schema.value("type", Json());
+  if (type == "array") return schema.contains("items") && is_of_numbers(schema.at("items"));
+  return type == "number" || type == "integer";
+}
+
+void allow_in(Json& schema) {
+  if (is_of_numbers(schema)) {
+    Json with_keyframes = Json::object(), alone = Json::object();
+    for (const auto& [key, value] : schema.items())
+      (key == "description" || key == "default" ? with_keyframes : alone)[key] = value;
+    with_keyframes["anyOf"] = {alone, keyframes_reference};
+    schema = with_keyframes;
+    return;
+  }
+  for (const char* key : {"properties", "oneOf"})
+    if (schema.contains(key))
+      for (Json& each : schema[key]) allow_in(each);
+  if (schema.contains("items")) allow_in(schema["items"]);
+  if (!schema.contains("anyOf")) return;
+  Json& alternatives = schema["anyOf"];
+  if (std::any_of(alternatives.begin(), alternatives.end(), is_of_numbers)) alternatives.push_back(keyframes_reference);
+}
+
 }  // namespace
 
 std::vector<int> parse_frames(const std::string& text) {
@@ -134,6 +177,11 @@ void refuse_keyframes(const Json& scene, const SceneSource& source) {
     if (!value.is_string())
       source.fail("`" + pointer + "` has keyframes: give --frames, as --frames 1-240 (frame=1 in Python)");
   });
+}
+
+void allow_keyframes(Json& schema) {
+  allow_in(schema);
+  schema["$defs"]["keyframes"] = keyframes_form();
 }
 
 }  // namespace tensorray

@@ -7,7 +7,6 @@
 
 #include "base/text/numbered_name.h"
 #include "scenes/keys/json_reader.h"
-#include "scenes/keys/scene_source.h"
 
 namespace tensorray {
 

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "scenes/keys/json_reader.h"
-#include "scenes/keys/scene_source.h"
 
 namespace tensorray {
 

@@ -1,7 +1,5 @@
 // Annotations of display pictures: what each method draws, where, and that no other file changes.
 
-#include "scenes/outputs/annotations.h"
-
 #include <algorithm>
 #include <cmath>
 #include <optional>

@@ -1,12 +1,11 @@
 // Tests how the picture of a lens shows obstacles.
 
-#include "integrators/lens/lens_obstacles.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "base/geometry/triangle_mesh.h"
+#include "integrators/lens/lens.h"
 #include "renderer/meshes/mesh.h"
 
 namespace tensorray {

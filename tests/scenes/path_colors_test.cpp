@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "scenes/outputs/annotations.h"
+#include "scenes/outputs/picture_outputs.h"
 
 namespace tensorray {
 namespace {

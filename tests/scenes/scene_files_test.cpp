@@ -9,7 +9,7 @@
 
 #include <sys/stat.h>
 
-#include "scenes/description/run_files.h"
+#include "scenes/description/check_scene.h"
 #include "tests/scenes/read_scene_fixture.h"
 
 namespace tensorray {

@@ -1,7 +1,5 @@
 // Fields whose bricks other processes map: the same bits.
 
-#include "scenes/scene/shared_field.h"
-
 #include <cmath>
 #include <cstring>
 #include <iostream>
@@ -12,6 +10,7 @@
 #include <unistd.h>
 
 #include "base/files/temporary_folder.h"
+#include "scenes/scene/scene.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {

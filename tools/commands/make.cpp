@@ -14,7 +14,7 @@
 #include "base/files/output_file.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"
-#include "scenes/keys/generate_grid.h"
+#include "scenes/keys/key_visitor.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/command_line/vdb_output.h"

@@ -6,7 +6,6 @@
 #include <CLI/CLI.hpp>
 
 #include "base/files/distinct_files.h"
-#include "scenes/jobs/origin.h"
 #include "scenes/jobs/work_file.h"
 #include "tools/commands/commands.h"
 #include "tools/rendering/render_scene.h"

@@ -9,7 +9,7 @@
 
 #include "base/text/path_text.h"
 #include "base/text/text.h"
-#include "scenes/jobs/origin.h"
+#include "scenes/jobs/work_file.h"
 #include "scenes/scene/render.h"
 
 namespace tensorray {

@@ -15,7 +15,7 @@
 #include "base/process/seconds.h"
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
-#include "scenes/description/run_files.h"
+#include "scenes/description/check_scene.h"
 #include "scenes/outputs/picture_outputs.h"
 
 namespace tensorray {

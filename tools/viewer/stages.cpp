@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "base/text/text.h"
-#include "scenes/description/run_files.h"
+#include "scenes/description/check_scene.h"
 
 namespace tensorray {
 namespace {

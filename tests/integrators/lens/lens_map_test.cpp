@@ -1,7 +1,5 @@
 // Compares parallel light that goes from plane to plane with closed forms.
 
-#include "integrators/lens/lens_map.h"
-
 #include <cmath>
 #include <complex>
 
@@ -9,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
+#include "integrators/lens/lens.h"
 #include "tests/tracing/support.h"
 #include "volumes/making/generators.h"
 

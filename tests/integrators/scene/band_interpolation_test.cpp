@@ -1,4 +1,3 @@
-#include "integrators/scene/band_interpolation.h"
 
 #include <cmath>
 

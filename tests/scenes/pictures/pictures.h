@@ -22,7 +22,6 @@
 #include "base/process/progress.h"
 #include "integrators/methods/read_scene.h"
 #include "renderer/images/image.h"
-#include "scenes/outputs/statistics_json.h"
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"

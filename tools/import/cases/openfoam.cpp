@@ -17,7 +17,7 @@
 #include <zlib.h>
 
 #include "base/errors.h"
-#include "base/text/parse_number.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 namespace {
