@@ -1,11 +1,11 @@
-#include "integrators/lens/lens_view.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 
 #include <Eigen/LU>
+
+#include "integrators/lens/lens_view.h"
 
 namespace tensorray {
 namespace {

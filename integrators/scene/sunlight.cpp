@@ -1,5 +1,3 @@
-#include "integrators/scene/field_light.h"
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -10,6 +8,7 @@
 #include "base/constants.h"
 #include "base/overloaded.h"
 #include "integrators/path_tracing/stage.h"
+#include "integrators/scene/field_light.h"
 #include "tracing/flow_drawing/flow_irradiance.h"
 
 namespace tensorray {

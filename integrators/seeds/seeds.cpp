@@ -15,7 +15,6 @@
 #include "base/errors.h"
 #include "base/geometry/box.h"
 #include "base/text/text.h"
-#include "base/text/text.h"
 #include "renderer/sampling/random.h"
 #include "volumes/bricks/brick_point.h"
 #include "volumes/sampling/tensor_sampler.h"

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "tracing/bending/geometry.h"
 #include "tracing/bending/bending.h"
+#include "tracing/bending/geometry.h"
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray::packets {

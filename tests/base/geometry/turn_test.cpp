@@ -10,7 +10,8 @@ namespace {
 using Eigen::Vector3d;
 
 TEST(TurnBetween, IsTheSmallestRotationOfOneDirectionToTheOther) {
-  const Vector3d directions[] = {{1, 0, 0}, {-1, 0, 0}, {0, 0, 2}, {0, 1e-9, -1}, {3, -4, 5}, {-3, 4, -5}, {1, 1e-7, 0}};
+  const Vector3d directions[] = {{1, 0, 0},  {-1, 0, 0},  {0, 0, 2},   {0, 1e-9, -1},
+                                 {3, -4, 5}, {-3, 4, -5}, {1, 1e-7, 0}};
   for (const Vector3d& from : directions)
     for (const Vector3d& to : directions) {
       const Eigen::Quaterniond turn = turn_between(from, to);

@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "integrators/photon_distribution/photon_distribution.h"
 #include "integrators/photon_distribution/photon_chunks.h"
+#include "integrators/photon_distribution/photon_distribution.h"
 #include "tests/base/rank_support.h"
 #include "tests/tracing/support.h"
 

@@ -1,7 +1,6 @@
-#include "integrators/seeds/seeds.h"
-
 #include <gtest/gtest.h>
 
+#include "integrators/seeds/seeds.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

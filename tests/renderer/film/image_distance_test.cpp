@@ -1,6 +1,6 @@
-#include "renderer/film/spectral_image.h"
-
 #include <gtest/gtest.h>
+
+#include "renderer/film/spectral_image.h"
 
 namespace tensorray {
 namespace {

@@ -1,10 +1,9 @@
-#include "tracing/bending/bending.h"
-
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "tests/tracing/support.h"
+#include "tracing/bending/bending.h"
 
 namespace tensorray {
 namespace {

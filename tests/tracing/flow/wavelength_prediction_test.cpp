@@ -1,11 +1,11 @@
 // Landings at the samples that are not traced.
 
-#include "tracing/flow/wavelength_tracer.h"
-
 #include <cmath>
 #include <functional>
 
 #include <gtest/gtest.h>
+
+#include "tracing/flow/wavelength_tracer.h"
 
 namespace tensorray {
 namespace {
