@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
-#include "integrators/lens/lens.h"
 #include "renderer/charts/grid_lines.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"

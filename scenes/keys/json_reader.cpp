@@ -87,9 +87,8 @@ std::string reason(const std::string& what) {
                      : bracket != std::string::npos                            ? what.substr(bracket + 2)
                                                                                : what;
   if (text.size() > 200) text = text.substr(0, 200) + "...";
-  for (char& c : text) {
+  for (char& c : text)
     if (static_cast<unsigned char>(c) >= 0x80) c = '?';
-  }
   const bool closing =
       text.find("unexpected '}'") != std::string::npos || text.find("unexpected ']'") != std::string::npos;
   return closing ? text + " (is there an extra comma before it?)" : text;

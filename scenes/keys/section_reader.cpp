@@ -171,9 +171,8 @@ void SectionReader::refuse_unknown_keys() const {
 void SectionReader::finish() const {
   refuse_unknown_keys();
   const std::string where = pointer_.empty() ? "the scene" : fmt::format("`{}`", pointer_);
-  for (const std::string& key : required_) {
+  for (const std::string& key : required_)
     if (!object_.contains(key)) source_.fail(fmt::format("{} needs the key `{}`", where, key));
-  }
   const auto given = std::count_if(alternatives_.begin(), alternatives_.end(),
                                    [this](const std::string& key) { return object_.contains(key); });
   if (!alternatives_.empty() && given != 1)

@@ -77,6 +77,27 @@ ColorStrip rgb_strip(const Scene& scene) {
   return strip;
 }
 
+/// The value of R, G or B that 99% of the lit pixels of a scene-linear picture do not exceed; nothing if it is black.
+std::optional<double> brightest_hundredth(const Image& linear) {
+  // A pixel is lit above this part of the undisturbed light, or of the brightest pixel if that is darker.
+  constexpr float lit = 0.02f;
+  constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker.
+  const std::size_t channels = linear.channels.size();
+  std::vector<float> values;
+  for (std::size_t i = 0; i + 2 < linear.pixels.size(); i += channels) {
+    const float value = std::max({linear.pixels[i], linear.pixels[i + 1], linear.pixels[i + 2]});
+    values.push_back(value);
+  }
+  const float brightest_value = values.empty() ? 0 : *std::max_element(values.begin(), values.end());
+  if (!(brightest_value > 0)) return std::nullopt;
+  const float threshold = lit * std::min(1.0f, brightest_value);
+  values.erase(std::remove_if(values.begin(), values.end(), [&](float value) { return value <= threshold; }),
+               values.end());
+  const auto bright = values.begin() + static_cast<std::ptrdiff_t>(brightest * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), bright, values.end());
+  return *bright;
+}
+
 }  // namespace
 
 std::vector<Output> picture_outputs(const std::vector<Output>& more) {
@@ -139,26 +160,6 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha) 
   draw_annotations(scene.description.output, render, image);
   scene.color.to_display(image);
   return image;
-}
-
-std::optional<double> brightest_hundredth(const Image& linear) {
-  // A pixel is lit above this part of the undisturbed light, or of the brightest pixel if that is darker.
-  constexpr float lit = 0.02f;
-  constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker.
-  const std::size_t channels = linear.channels.size();
-  std::vector<float> values;
-  for (std::size_t i = 0; i + 2 < linear.pixels.size(); i += channels) {
-    const float value = std::max({linear.pixels[i], linear.pixels[i + 1], linear.pixels[i + 2]});
-    values.push_back(value);
-  }
-  const float brightest_value = values.empty() ? 0 : *std::max_element(values.begin(), values.end());
-  if (!(brightest_value > 0)) return std::nullopt;
-  const float threshold = lit * std::min(1.0f, brightest_value);
-  values.erase(std::remove_if(values.begin(), values.end(), [&](float value) { return value <= threshold; }),
-               values.end());
-  const auto bright = values.begin() + static_cast<std::ptrdiff_t>(brightest * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), bright, values.end());
-  return *bright;
 }
 
 void write_grids(const std::filesystem::path& file, const Scene& scene, const Render& render) {

@@ -29,9 +29,6 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha);
 /// The exposure of the picture that a display shows, in stops: the scene's, or the one that "auto" chooses.
 double display_exposure(const Scene& scene, const Render& render);
 
-/// The value of R, G or B that 99% of the lit pixels of a scene-linear picture do not exceed; nothing if it is black.
-std::optional<double> brightest_hundredth(const Image& linear);
-
 /// Header entries about the origin of a file: program, scene, seed, scale, colour, and Render::metadata.
 ImageMetadata provenance(const Scene& scene, const Render& render);
 

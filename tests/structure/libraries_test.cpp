@@ -98,8 +98,8 @@ TEST(Structure, OnlyBendingKnowsTheRule) {
 TEST(Structure, WhatComputesNeverSeesAScene) {
   const std::regex includes("#include \"scenes/(scene/scene|description/description)\\.h\"");
   const std::regex computes(
-      "/(lens|lens_map|lens_obstacles|lens_shading|lens_view|fluence|photon_chunks|photon_distribution|"
-      "band_interpolation|field_region|stretch)\\.(h|cpp)$");
+      "/(lens|lens_map|lens_shading|lens_view|fluence|photon_chunks|photon_distribution|"
+      "field_region|stretch)\\.(h|cpp)$");
   std::size_t found = 0;
   for (const Line& line : lines_of("integrators")) {
     if (!std::regex_search(line.file, computes)) continue;
