@@ -34,8 +34,6 @@ class ColorTest : public ::testing::Test {
 
 Eigen::Vector3d from_chromaticity(double x, double y) { return {x / y, 1, (1 - x - y) / y}; }
 
-Eigen::Vector3d xyz_of(const Spectrum& light) { return make_bands(light, observer_min, observer_max, 1).front().xyz; }
-
 double srgb(double v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055; }
 
 /// The value that a display shows for scene-linear grey.

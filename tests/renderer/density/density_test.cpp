@@ -148,16 +148,6 @@ const std::vector<DensitySettings> all_kinds{
 const std::vector<Eigen::Vector3d> rgb{{1, 0.2, 0}, {-0.1, 0.9, 0.3}, {0, 0, 2}};
 constexpr int width = 150, height = 101;
 
-/// Adds every `parts`th photon of three channels, most of which are on a small part of the plate, on all threads.
-void add_photons(DensityEstimator& estimator, int part = 0, int parts = 1) {
-  static const Points spread = random_points(2000, width, height), dense = random_points(4000, 30, 20);
-  tbb::parallel_for(0, 4000 / parts, [&](int task) {
-    const auto i = static_cast<std::size_t>(part + task * parts);
-    const Vector2d at = i < spread.size() ? spread[i] : Vector2d(dense[i] + Vector2d(40, 50));
-    estimator.add(static_cast<int>(i % 3), at, Vector2d(1 + static_cast<double>(i % 3), 0.5).asDiagonal());
-  });
-}
-
 std::string sums_of(DensityEstimator& estimator) {
   Archive archive;
   estimator.copy_sums(archive);

@@ -114,8 +114,6 @@ struct Wheel {
   }
 };
 
-double saturation(const Eigen::Vector3d& color) { return 1 - color.minCoeff() / color.maxCoeff(); }
-
 TEST(TestImagesTest, ColorWheelHasRedAtTheRightAndGoesOnCounterClockwise) {
   const Wheel wheel;
   const double shift = 0.06;  // Away from the radial lines.
