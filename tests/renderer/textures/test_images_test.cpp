@@ -38,11 +38,6 @@ double largest_difference(const Image& a, const Image& b) {
   return largest;
 }
 
-class EveryTestImage : public ::testing::TestWithParam<TestImage> {};
-INSTANTIATE_TEST_SUITE_P(TestImagesTest, EveryTestImage,
-                         ::testing::Values(TestImage::checkerboard, TestImage::grid, TestImage::color_wheel,
-                                           TestImage::line));
-
 /// Edges are anti-aliased exactly: a small picture equals a large one after reduction. (The grids are so small that
 /// neither has labels.)
 TEST(TestImagesTest, SmallPicturesAreLargeOnesReduced) {
