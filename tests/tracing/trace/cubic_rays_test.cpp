@@ -163,5 +163,18 @@ TEST(CubicRays, ConstantTensors) {
   EXPECT_LT((ray.direction - direction).norm(), 1e-12);
 }
 
+/// The path retraced from its end with −V and −s returns, to the order of the method.
+TEST(CubicRays, Reversal) {
+  const TensorField field = field_of(formula, 33, cubic);
+  const Geometry geometry(surfaces_of(field));
+  for (const Start& start : starts()) {
+    const BendingSettings settings = settings_for(BendingMethod::automatic, 0);
+    const Ray there = trace_one(field, geometry, settings, start.position, start.direction, flexibility);
+    const Ray back = trace_one(field, geometry, settings, there.position, -there.direction, -flexibility);
+    EXPECT_LT((back.position - start.position).norm(), 1e-3 * voxel_size(field));
+    EXPECT_LT((back.direction + start.direction).norm(), 1e-4);
+  }
+}
+
 }  // namespace
 }  // namespace tensorray
