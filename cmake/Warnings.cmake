@@ -89,13 +89,14 @@ function(tensorray_compile_by_room target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${TENSORRAY_UNITY} UNITY_BUILD_MODE GROUP)
 endfunction()
 
-# tensorray_library(NAME [EXCEPT PATHS]): a static library of all sources in this folder and its subfolders, without
-# those whose paths match an expression (CONFIGURE_DEPENDS finds new files by itself).
+# tensorray_library(NAME [EXCEPT PATTERN...]): a static library of all sources in this folder and its subfolders,
+# without those of file(GLOB) patterns (CONFIGURE_DEPENDS finds new files by itself).
 function(tensorray_library name)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "" EXCEPT "")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" EXCEPT)
   file(GLOB sources CONFIGURE_DEPENDS *.cpp */*.cpp)
   if(ARG_EXCEPT)
-    list(FILTER sources EXCLUDE REGEX "${ARG_EXCEPT}")
+    file(GLOB others CONFIGURE_DEPENDS ${ARG_EXCEPT})
+    list(REMOVE_ITEM sources ${others})
   endif()
   add_library(${name} STATIC ${sources})
   tensorray_compile_by_room(${name})
