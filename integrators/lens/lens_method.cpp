@@ -194,7 +194,7 @@ void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const P
       draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
   const Plate& plane = light.setup.image.plane;
   all.pictures.push_back(make_image(picture));
-  if (settings_.obstacles == ObstacleLook::shaded)
+  if (settings_.obstacles == ObstacleLook::shaded && is_root(light.settings.job ? light.settings.job->ranks : nullptr))
     draw_obstacles(scene.geometry.surfaces(), light.setup, settings_.samples, all.pictures.back());
   if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, all.pictures.back());
   add_statistics(picture, all.statistics);
