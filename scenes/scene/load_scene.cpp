@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
-#include "base/errors.h"
 #include "base/process/seconds.h"
 #include "base/text/numbered_name.h"
 #include "renderer/meshes/mesh.h"
@@ -49,12 +48,16 @@ std::vector<long long> identity_of(const std::filesystem::path& file) {
           status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
 }
 
-LoadedField load_field(const SceneDescription& scene, const Progress& progress) {
+/// What names the field in notes and errors.
+std::string source_of(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
-  const std::string source = field.generate ? kind_of(field.generate->generator) : field.file.string();
+  return field.generate ? kind_of(field.generate->generator) : field.file.string();
+}
+
+LoadedField load_field(const SceneDescription& scene, const Progress& progress) {
   const std::string key = field_key(scene) + fmt::format("{}", fmt::join(identity_of("/proc/self/exe"), " "));
   return share_field(
-      key, [&] { return prepare_field(open_field(scene), choices_of(scene), source); }, progress);
+      key, [&] { return prepare_field(open_field(scene), choices_of(scene), source_of(scene)); }, progress);
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
@@ -192,19 +195,6 @@ bool ends_at_surface(const SceneDescription& description, const TensorField& fie
   return word && *word == BoundsChoice::automatic && !field.surface().triangles.empty();
 }
 
-TriangleMesh closed_surface(const SceneDescription& description, const TensorField& field) {
-  TriangleMesh surface = field.surface();
-  try {
-    require_closed(surface);
-  } catch (const std::invalid_argument& error) {
-    fail(description.field.file,
-         fmt::format("the surface of the field's body: {}; `field.bounds: \"none\"` ignores it, "
-                     "and a closed mesh replaces it",
-                     error.what()));
-  }
-  return surface;
-}
-
 /// Loads the bounds of the field and its cut.
 Surfaces load_volume(const SceneDescription& description, const TensorField& field) {
   Surfaces surfaces;
@@ -212,7 +202,7 @@ Surfaces load_volume(const SceneDescription& description, const TensorField& fie
   if (const auto* mesh = std::get_if<std::filesystem::path>(&description.field.bounds))
     surfaces.cut = load_closed_mesh(*mesh);
   else if (ends_at_surface(description, field))
-    surfaces.cut = closed_surface(description, field);
+    surfaces.cut = closed_surface(field.surface(), source_of(description));
   return surfaces;
 }
 
@@ -346,6 +336,17 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
 }
 
 }  // namespace
+
+TriangleMesh closed_surface(TriangleMesh surface, const std::string& source) {
+  try {
+    require_closed(surface);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format(
+        "{}: the surface of the field's body: {}; `field.bounds: \"none\"` ignores it, a closed mesh replaces it",
+        source, error.what()));
+  }
+  return surface;
+}
 
 DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
   DepthRange range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};

@@ -97,6 +97,10 @@ std::optional<LoadedField> field_of(const std::optional<Scene>& before, const Sc
 /// the loaded data; Cancelled.
 Scene load_scene(SceneDescription description, const Progress& progress, std::optional<LoadedField> field = {});
 
+/// The surface of a field's body, as what cuts the volume. @param source  Names the field in errors.
+/// @throw std::runtime_error, one line that names the fix, if it is not closed.
+TriangleMesh closed_surface(TriangleMesh surface, const std::string& source);
+
 /// Where the volume begins and ends along a direction, as signed distances from an origin, world units.
 struct DepthRange {
   double near = 0, far = 0;

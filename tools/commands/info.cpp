@@ -52,7 +52,8 @@ FieldInfo field_info(const InfoOptions& options, const std::string& name) {
   TensorGrid grid = read_tensor_vdb(options.file, name, options.derive);
   FieldInfo info{grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid), grid.surface, {}};
   if (info.statistics.active_voxels > info.statistics.non_finite) {
-    const MadeField made = make_field(view_of(grid), Eigenvalues::raw, {Interpolation::cubic, Border::fade});
+    const Border border = grid.surface.triangles.empty() ? Border::fade : Border::extend;
+    const MadeField made = make_field(view_of(grid), Eigenvalues::raw, {Interpolation::cubic, border});
     info.resolution = made.resolution;
     info.statistics.memory_bytes = made.field->memory_bytes();
   }
