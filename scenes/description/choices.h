@@ -33,6 +33,10 @@ inline Choices<BorderChoice> choices(BorderChoice) {
   return {{"auto", BorderChoice::automatic}, {"fade", BorderChoice::fade}, {"extend", BorderChoice::extend}};
 }
 
+inline Choices<BoundsChoice> choices(BoundsChoice) {
+  return {{"auto", BoundsChoice::automatic}, {"none", BoundsChoice::none}};
+}
+
 inline Choices<BendingMethod> choices(BendingMethod) {
   return {{"auto", BendingMethod::automatic},
           {"euler", BendingMethod::euler},
