@@ -97,18 +97,28 @@ inline void intersect(RTCScene scene, std::vector<RTCRayHit>& rays) {
 #endif
 }
 
+/// Where a ray meets a triangle; see Embree's ray and hit.
+struct MetTriangle {
+  unsigned geometry, primitive;
+  float distance, u, v;
+  float cosine;  // Of the ray's direction and the triangle's normal.
+};
+
 /// Calls `add` for each triangle along a ray, some of them more than once. The scene needs `all_triangles_flag`.
-inline void visit_all(RTCScene scene, RTCRayHit ray, void (*add)(void*, unsigned, unsigned), void* user) {
+inline void visit_all(RTCScene scene, RTCRayHit ray, void (*add)(void*, const MetTriangle&), void* user) {
   struct AllTriangles {
     QueryContext context;  // First, so that its address is that of the whole.
-    void (*add)(void* user, unsigned geometry, unsigned primitive);
+    void (*add)(void* user, const MetTriangle& triangle);
     void* user;
 
     /// Refuses all hits, so that the search goes on.
     static void take(const RTCFilterFunctionNArguments* arguments) {
       auto* const all = reinterpret_cast<AllTriangles*>(arguments->context);
-      all->add(all->user, RTCHitN_geomID(arguments->hit, arguments->N, 0),
-               RTCHitN_primID(arguments->hit, arguments->N, 0));
+      const RTCRay ray = rtcGetRayFromRayN(arguments->ray, arguments->N, 0);
+      const RTCHit hit = rtcGetHitFromHitN(arguments->hit, arguments->N, 0);
+      const Eigen::Vector3f normal(hit.Ng_x, hit.Ng_y, hit.Ng_z);
+      const float along = normal.dot(Eigen::Vector3f(ray.dir_x, ray.dir_y, ray.dir_z));
+      all->add(all->user, {hit.geomID, hit.primID, ray.tfar, hit.u, hit.v, along / normal.norm()});
       arguments->valid[0] = 0;
     }
   } all{{}, add, user};

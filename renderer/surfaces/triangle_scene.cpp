@@ -12,11 +12,15 @@ namespace {
 using embree::check;
 using embree::Owned;
 
+constexpr float clear_of_edges = 1e-5f;    // Barycentric; Embree meets both triangles within 2e-7 of an edge.
+constexpr float clear_of_grazing = 1e-3f;  // Cosine.
+
 /// Sorts by mesh and triangle. Embree may report a triangle more than once if its search tree has split it.
-void sort_and_join(std::vector<TriangleId>& triangles) {
-  const auto key = [](const TriangleId& id) { return std::tie(id.mesh, id.triangle); };
-  const auto before = [&](const TriangleId& a, const TriangleId& b) { return key(a) < key(b); };
-  const auto same = [&](const TriangleId& a, const TriangleId& b) { return key(a) == key(b); };
+template <class Triangle>
+void sort_and_join(std::vector<Triangle>& triangles) {
+  const auto key = [](const Triangle& id) { return std::tie(id.mesh, id.triangle); };
+  const auto before = [&](const Triangle& a, const Triangle& b) { return key(a) < key(b); };
+  const auto same = [&](const Triangle& a, const Triangle& b) { return key(a) == key(b); };
   std::sort(triangles.begin(), triangles.end(), before);
   triangles.erase(std::unique(triangles.begin(), triangles.end(), same), triangles.end());
 }
@@ -145,6 +149,26 @@ std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, c
   return TriangleHit{min_distance + ray.ray.tfar * state_->unit, ray.hit.geomID, ray.hit.primID};
 }
 
+void TriangleScene::crossings(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
+                              double max_distance, std::vector<TriangleCrossing>& crossings) const {
+  crossings.clear();
+  if (!state_->scene) return;
+  if (state_->is_far(from + min_distance * direction)) {
+    const auto way = entry(state_->box, from, direction);
+    if (!way || *way > max_distance) return;
+    min_distance = std::max(min_distance, *way);
+  }
+  const auto add = [](void* user, const embree::MetTriangle& met) {
+    const bool is_clear =
+        std::min({met.u, met.v, 1 - met.u - met.v}) > clear_of_edges && std::abs(met.cosine) > clear_of_grazing;
+    static_cast<std::vector<TriangleCrossing>*>(user)->push_back(
+        {met.distance, met.geometry, met.primitive, met.cosine > 0 ? 1 : -1, is_clear});
+  };
+  embree::visit_all(state_->scene.get(), state_->ray(from, direction, min_distance, max_distance), add, &crossings);
+  if (crossings.size() > 1) sort_and_join(crossings);
+  for (TriangleCrossing& crossing : crossings) crossing.distance = min_distance + crossing.distance * state_->unit;
+}
+
 void TriangleScene::along(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
                           std::vector<TriangleId>& candidates) const {
   candidates.clear();
@@ -155,8 +179,8 @@ void TriangleScene::along(const Eigen::Vector3d& from, const Eigen::Vector3d& di
     if (!way) return;
     start = std::max(start, *way);
   }
-  const auto add = [](void* user, unsigned mesh, unsigned triangle) {
-    static_cast<std::vector<TriangleId>*>(user)->push_back({mesh, triangle});
+  const auto add = [](void* user, const embree::MetTriangle& met) {
+    static_cast<std::vector<TriangleId>*>(user)->push_back({met.geometry, met.primitive});
   };
   embree::visit_all(state_->scene.get(), state_->ray(from, direction, start, std::numeric_limits<double>::infinity()),
                     add, &candidates);

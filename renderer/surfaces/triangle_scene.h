@@ -25,6 +25,14 @@ struct TriangleHit {
   std::uint32_t mesh = 0, triangle = 0;
 };
 
+/// One of the triangles that a line meets.
+struct TriangleCrossing {
+  double distance = 0;  ///< As that of TriangleHit.
+  std::uint32_t mesh = 0, triangle = 0;
+  int sign = 0;           ///< 1: the line goes out, where normals point outwards; −1: in.
+  bool is_clear = false;  ///< False at edges and vertices, where it may be counted twice, and where it is grazed.
+};
+
 /// Immutable; any number of threads may query it at once. It keeps no reference to the meshes.
 ///
 /// A query may have any values: if it cannot meet a triangle in single precision, or a value is NaN, it finds nothing.
@@ -48,6 +56,11 @@ class TriangleScene {
   /// The nearest triangle between the two distances (world units; the first may be negative), from either side.
   std::optional<TriangleHit> nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
                                      double max_distance) const;
+
+  /// Sets `crossings` to all triangles between the two distances. Where none is in doubt, lines miss or meet a closed
+  /// mesh consistently: the signs behind any point of the line add up to how often the mesh surrounds it.
+  void crossings(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
+                 double max_distance, std::vector<TriangleCrossing>& crossings) const;
 
   /// Sets `candidates` to the triangles that a ray meets, in order of mesh and triangle; some of them it misses by
   /// single precision.

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "renderer/surfaces/triangle_scene.h"
+#include "tracing/bending/clearance.h"
 
 namespace tensorray {
 namespace {
@@ -24,6 +26,8 @@ struct Part {
   const TriangleMesh* mesh;  // In double precision; the scene has a copy in single precision.
   Surface surface;
 };
+
+using Crossings = std::vector<TriangleCrossing>;
 
 std::vector<const TriangleMesh*> meshes(const std::vector<Part>& parts) {
   std::vector<const TriangleMesh*> result;
@@ -54,7 +58,12 @@ struct Geometry::State {
         margin(relative_margin * size),
         bounds({{&surfaces.bounds, Surface::bounds}}, volume.center(), size),
         cut(cut_parts(), volume.center(), size),
-        absorbers(absorber_parts(), volume.center(), size) {}
+        absorbers(absorber_parts(), volume.center(), size),
+        clearance(volume, margin) {
+    for (const Group* group : {&cut, &absorbers})
+      for (const Part& part : group->parts) clearance.add(*part.mesh);
+    clearance.spread();
+  }
 
   Surfaces surfaces;
   TriangleMesh receiver;
@@ -62,6 +71,7 @@ struct Geometry::State {
   double size, margin;
   // The scenes' coordinates are relative to the volume, so that single precision resolves it well.
   Group bounds, cut, absorbers;
+  Clearance clearance;
 
   /// @throw std::invalid_argument if single precision does not reach the mesh.
   Part part_of(const TriangleMesh& mesh, Surface surface, const std::string& name) const {
@@ -91,8 +101,14 @@ struct Geometry::State {
                              double min_distance, double max_distance) const {
     const auto seen = group.scene.nearest(from, direction, min_distance, max_distance);
     if (!seen) return std::nullopt;
-    const Part& part = group.parts[seen->mesh];
-    const auto& triangle = part.mesh->triangles[seen->triangle];
+    return exact(group, from, direction, *seen);
+  }
+
+  /// The hit of a triangle, its distance in double precision. @param seen  What the group's scene has found.
+  template <class Seen>
+  Hit exact(const Group& group, const Eigen::Vector3d& from, const Eigen::Vector3d& direction, const Seen& seen) const {
+    const Part& part = group.parts[seen.mesh];
+    const auto& triangle = part.mesh->triangles[seen.triangle];
     const Eigen::Vector3d& a = part.mesh->vertices[triangle[0]];
     const Eigen::Vector3d& b = part.mesh->vertices[triangle[1]];
     const Eigen::Vector3d& c = part.mesh->vertices[triangle[2]];
@@ -101,11 +117,83 @@ struct Geometry::State {
     hit.normal = (b - a).cross(c - a).normalized();
     const double exact = hit.normal.dot(a - from) / hit.normal.dot(direction);
     // Where a ray grazes a plane, the distance to the plane is ill-conditioned: keep the distance from Embree.
-    const double allowed = 10 * (margin + relative_margin * std::abs(seen->distance));
-    hit.distance = std::abs(exact - seen->distance) <= allowed ? exact : seen->distance;
+    const double allowed = 10 * (margin + relative_margin * std::abs(seen.distance));
+    hit.distance = std::abs(exact - seen.distance) <= allowed ? exact : seen.distance;
     return hit;
   }
+
+  /// Sets `crossings` to those of a line with the cut, from the first to the last.
+  void cross_cut(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
+                 double max_distance, Crossings& crossings) const {
+    cut.scene.crossings(from, direction, min_distance, max_distance, crossings);
+    for (TriangleCrossing& crossing : crossings) crossing.distance = exact(cut, from, direction, crossing).distance;
+    std::sort(crossings.begin(), crossings.end(), [](const TriangleCrossing& a, const TriangleCrossing& b) {
+      return std::tie(a.distance, a.mesh, a.triangle) < std::tie(b.distance, b.mesh, b.triangle);
+    });
+  }
+
+  /// Whether light is inside the cut just beyond some of its crossings, those from `first` to before `last`, which
+  /// count as one.
+  /// @param crossings  All of the light.
+  bool is_inside_beyond(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, const Crossings& crossings,
+                        std::size_t first, std::size_t last) const {
+    int count = 0;
+    bool is_clear = true;
+    for (std::size_t i = crossings.size(); i-- > last;) {
+      count += crossings[i].sign;
+      is_clear = is_clear && crossings[i].is_clear && count >= 0;
+    }
+    if (is_clear) return count > 0;
+    Eigen::Vector3d past = direction;
+    for (std::size_t i = first; i < last; ++i)
+      past += 2 * crossings[i].sign * exact(cut, from, direction, crossings[i]).normal;
+    const double at = last > first ? crossings[last - 1].distance : 0;
+    return is_inside(from + at * direction + 3 * margin * past.normalized());
+  }
+
+  /// Whether the cut surrounds a point that is not on it.
+  bool is_inside(const Eigen::Vector3d& point) const {
+    int count = 0;
+    for (const Eigen::Vector3d& direction : generic_directions) {
+      Crossings crossings;
+      cross_cut(point, direction, 0, infinite, crossings);
+      count = 0;
+      bool is_clear = true;
+      for (const TriangleCrossing& crossing : crossings) {
+        count += crossing.sign;
+        is_clear = is_clear && crossing.is_clear;
+      }
+      if (is_clear) break;
+    }
+    return count > 0;
+  }
+
+  /// `Geometry::crossing` of the cut.
+  std::optional<Hit> cut_crossing(bool inwards, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                                  double max_distance) const {
+    const auto may_count = [&](const TriangleCrossing& crossing) {
+      return (crossing.sign < 0) == inwards && crossing.distance <= max_distance;
+    };
+    Crossings all;
+    cross_cut(from, direction, -margin, max_distance + margin, all);
+    if (std::none_of(all.begin(), all.end(), may_count)) return std::nullopt;
+    cross_cut(from, direction, -margin, infinite, all);
+    for (std::size_t first = 0, last = 0; first < all.size(); first = last) {
+      for (last = first + 1; last < all.size() && all[last].distance - all[last - 1].distance <= margin;) ++last;
+      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(first);
+      const auto end = all.begin() + static_cast<std::ptrdiff_t>(last), found = std::find_if(begin, end, may_count);
+      if (found == end || is_inside_beyond(from, direction, all, first, last) != inwards) continue;
+      Hit hit = exact(cut, from, direction, *found);
+      hit.distance = std::max(hit.distance, 0.0);
+      return hit;
+    }
+    return std::nullopt;
+  }
 };
+
+const std::array<Eigen::Vector3d, 3> Geometry::generic_directions{
+    Eigen::Vector3d(0.5381, 0.3127, 0.7827).normalized(), Eigen::Vector3d(-0.2713, 0.8461, 0.4589).normalized(),
+    Eigen::Vector3d(0.7193, -0.4397, -0.5378).normalized()};
 
 Geometry::Geometry(Surfaces surfaces) : state_(std::make_unique<State>(std::move(surfaces))) {}
 Geometry::~Geometry() = default;
@@ -144,11 +232,11 @@ Eigen::AlignedBox3d Geometry::absorbers_within(const Eigen::AlignedBox3d& region
 
 std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double max_distance) const {
-  const Group& group = surface == Surface::bounds ? state_->bounds : state_->cut;
+  if (surface == Surface::cut) return state_->cut_crossing(inwards, origin, direction, max_distance);
   constexpr int max_crossings = 10000;  // Of one line with one mesh; rounding must not make this loop endless.
   double from = -state_->margin;
   for (int i = 0; i < max_crossings; ++i) {
-    auto hit = state_->nearest(group, origin, direction, from, max_distance + state_->margin);
+    auto hit = state_->nearest(state_->bounds, origin, direction, from, max_distance + state_->margin);
     if (!hit || hit->distance > max_distance) return std::nullopt;
     if ((hit->normal.dot(direction) < 0) == inwards) {
       hit->distance = std::max(hit->distance, 0.0);
@@ -161,13 +249,15 @@ std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen
   return std::nullopt;
 }
 
-bool Geometry::inside_cut(const Eigen::Vector3d& point) const {
+bool Geometry::inside_cut(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const {
   if (!has_cut()) return true;
-  // From inside a closed mesh, a ray in any direction meets the first surface from behind. This direction is unlikely
-  // to meet an edge.
-  const Eigen::Vector3d direction = Eigen::Vector3d(0.5381, 0.3127, 0.7827).normalized();
-  const auto hit = state_->nearest(state_->cut, point, direction, 0, infinite);
-  return hit && hit->normal.dot(direction) > 0;
+  Crossings all;
+  state_->cross_cut(point, direction, -state_->margin, infinite, all);
+  std::size_t here = 0;
+  while (here < all.size() && all[here].distance <= state_->margin) ++here;
+  return state_->is_inside_beyond(point, direction, all, 0, here);
 }
+
+double Geometry::clearance(const Eigen::Vector3d& point) const { return state_->clearance.at(point); }
 
 }  // namespace tensorray

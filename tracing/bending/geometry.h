@@ -2,6 +2,7 @@
 /// @file tracing/bending/geometry.h
 /// Finds where light meets the surfaces of a scene: bounds, cut, plate and obstacles.
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -64,7 +65,9 @@ class Geometry {
   Eigen::AlignedBox3d absorbers_within(const Eigen::AlignedBox3d& region) const;
 
   /// Where light first crosses the bounds or the cut in the given sense (inwards or outwards). Crossings in the other
-  /// sense are skipped.
+  /// sense are skipped. A mesh may consist of closed shells that touch or overlap: of the cut, only what separates
+  /// inside from outside is crossed. Inside is where the cut surrounds a point more often than not at all, counted just
+  /// beyond all that the light meets within `margin`.
   std::optional<Hit> crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                               const Eigen::Vector3d& direction, double max_distance = infinite) const;
 
@@ -73,8 +76,14 @@ class Geometry {
   const Surfaces& surfaces() const;
   bool has_cut() const { return surfaces().cut.has_value(); }
 
-  /// Whether a point is inside the cut; true if there is no cut.
-  bool inside_cut(const Eigen::Vector3d& point) const;
+  /// Whether light from a point is inside the cut just beyond it; true if there is no cut.
+  bool inside_cut(const Eigen::Vector3d& point, const Eigen::Vector3d& direction = generic_directions[0]) const;
+
+  /// Lower bound of the distance to the cut and the absorbers from a point in the volume; 0 if it is not known. Cheap.
+  double clearance(const Eigen::Vector3d& point) const;
+
+  /// Unit directions that are unlikely to meet an edge.
+  static const std::array<Eigen::Vector3d, 3> generic_directions;
 
   static constexpr double infinite = std::numeric_limits<double>::infinity();
 

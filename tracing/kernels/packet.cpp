@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <Eigen/Geometry>
 
@@ -84,28 +85,61 @@ struct LaneStep {
   }
 };
 
-/// Whether the straight way from one point to another meets a surface.
-bool meets_surface(const Geometry& geometry, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-  const bool may_absorb = geometry.may_absorb(from, to);
-  if (!may_absorb && !geometry.has_cut()) return false;
-  const double length = (to - from).norm();
-  if (!(length > 0)) return true;
-  const Eigen::Vector3d along = (to - from) / length;
-  return (geometry.has_cut() && geometry.crossing(Surface::cut, false, from, along, length)) ||
-         (may_absorb && geometry.absorber(from, along, length));
+/// What the straight way of a length along a direction meets first.
+std::optional<Hit> first_hit(const Geometry& geometry, const Eigen::Vector3d& from, const Eigen::Vector3d& along,
+                             double length) {
+  std::optional<Hit> hit;
+  if (geometry.has_cut()) hit = geometry.crossing(Surface::cut, false, from, along, length);
+  if (hit) length = hit->distance;
+  if (!geometry.may_absorb(from, from + length * along)) return hit;
+  const auto absorber = geometry.absorber(from, along, length);
+  return absorber ? absorber : hit;
+}
+
+/// Whether no surface is near the path of a step. All of it is near one of its ends.
+bool is_clear(const Geometry& geometry, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double length) {
+  const double rest = 1.001 * length - geometry.clearance(from);
+  return rest < 0 || rest < geometry.clearance(to);
+}
+
+/// Whether a surface is met in the extent. A cut that ends where the extent ends is left with the extent.
+bool is_within(const TensorField& field, const SurfaceLanding& landing) {
+  const double near = landing.hit.surface == Surface::cut ? 1e-4 : 0;  // Voxels.
+  const Eigen::Array3d at = field.to_index() * landing.point;
+  return (at >= field.index_bounds().min().array() + near).all() &&
+         (at <= field.index_bounds().max().array() - near).all();
 }
 
 }  // namespace
 
-bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane) {
+bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane, bool leaves,
+                        SurfaceLanding& landing) {
   const LaneStep step(packet, lane);
+  landing.part = 0;
   if (!medium.settings.surfaces.intersects(step.bounds())) return false;
-  const auto to_world = [&](const Eigen::Vector3d& at) { return medium.field.to_world() * (step.origin + at); };
+  const Geometry& geometry = *medium.settings.geometry;
+  const auto to_world = [&](const Eigen::Vector3d& at) -> Eigen::Vector3d {
+    return medium.field.to_world() * (step.origin + at);
+  };
+  const Eigen::Vector3d first = to_world(step.from), last = to_world(step.to);
+  if (is_clear(geometry, first, last, step.time)) return false;
   const int count = chords_of(step.voxels(), step.turn);
-  Eigen::Vector3d begin = step.from;
+  Eigen::Vector3d begin = first;
   for (int i = 1; i <= count; ++i) {
-    const Eigen::Vector3d end = i == count ? step.to : step.at(path_weights(double(i) / count));
-    if (meets_surface(*medium.settings.geometry, to_world(begin), to_world(end))) return true;
+    const Eigen::Vector3d end = i == count ? last : to_world(step.at(path_weights(double(i) / count)));
+    const double length = (end - begin).norm();
+    if (!(length > 0)) continue;
+    const Eigen::Vector3d along = (end - begin) / length;
+    if (const auto hit = first_hit(geometry, begin, along, length)) {
+      landing.hit = *hit;
+      landing.point = begin + hit->distance * along;
+      const Eigen::Vector3d normal = medium.field.to_world().linear().transpose() * hit->normal;
+      landing.normal = {float(normal[0]), float(normal[1]), float(normal[2])};
+      landing.to_plane = static_cast<float>(hit->normal.dot(landing.point - first));
+      // A step that lands at its beginning is not none.
+      landing.part = std::max(1e-30f, static_cast<float>((i - 1 + hit->distance / length) / count));
+      return !leaves || is_within(medium.field, landing);
+    }
     begin = end;
   }
   return false;

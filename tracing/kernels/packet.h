@@ -107,8 +107,10 @@ struct StrongKick {
 /// @param T  T − T₂₂ I, column by column. @param factor  σ h.
 StrongKick strong_kick(const float T[9], float factor, const float v[3]);
 
-/// Whether the step of a lane, from `now` to `next`, meets a surface.
-bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane);
+/// Whether the step of a lane, from `now` to `next`, meets a surface before it leaves the extent; sets `landing`.
+/// @param leaves  Whether `next` is outside the extent.
+bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane, bool leaves,
+                        SurfaceLanding& landing);
 
 /// Records points between the ends of a lane's step, which may be long.
 void add_inner_points(const PacketMedium& medium, const Packet& packet, int lane, std::vector<StepPoint>& points);

@@ -140,21 +140,24 @@ class Kernel {
   }
 
   /// The lanes that cannot take this step, as bits. Sets those that meet a surface.
-  HWY_NOINLINE std::uint32_t stopped(Packet& packet) const {
+  /// @param tested  The lanes that end their steps. @param leave  Those that end them outside the extent.
+  HWY_NOINLINE std::uint32_t stopped(Packet& packet, std::uint32_t tested, std::uint32_t leave) const {
     std::uint32_t stop = 0;
     for (int i = 0; i < packet.vectors * lanes; i += lanes) {
       const F3 v = load(packet.next.v, i);
       stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // The ray has no direction.
     }
     if (!packet.near_surface && !medium_.bounded) return stop;
-    for_lanes(packet.alive, [&](int lane) {
-      const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Length of the path up to the field.
+    for_lanes(tested & ~stop, [&](int lane) {
+      const std::int32_t ray = packet.ray[lane];
+      const float before = static_cast<float>(rays_[ray].length);  // Length of the path up to the field.
       if (packet.length[lane] + packet.time[lane] + before >= medium_.settings.max_length)
         stop |= 1u << lane;
-      else if (packet.near_surface && step_meets_surface(medium_, packet, lane))
+      else if (packet.near_surface &&
+               step_meets_surface(medium_, packet, lane, leave >> lane & 1, batch_.landings[ray]))
         packet.lands |= 1u << lane;
     });
-    return stop | packet.lands;
+    return stop;
   }
 
   /// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
@@ -247,8 +250,9 @@ class Kernel {
     std::uint32_t leave = 0;
     for (int axis = 0; axis < 3; ++axis) leave |= outside(medium_, packet, packet.next.p[axis], axis);
     leave &= ~staying;
-    stop |= stopped(packet) & ~staying;
+    stop |= stopped(packet, packet.alive & ~staying, leave) & ~staying;
     if (packet.steps >= packet.step_limit) stop |= spent(packet);
+    leave |= packet.lands;
     if constexpr (differentials) {  // The reference computes the differentials at a crossing.
       stop |= leave;
       packet.lands |= leave;
@@ -266,13 +270,25 @@ class Kernel {
     if ((stop | leave) != 0 && packet.alive != 0) compact(packet);
   }
 
-  /// Repeats the step that leaves the extent, with the length that ends on its face.
+  /// Sets the planes of the lanes whose steps meet a surface.
+  HWY_NOINLINE void set_planes(const Packet& packet, FaceLanding& landing) const {
+    for (int lane = 0; lane < packet.vectors * lanes; ++lane) {
+      const SurfaceLanding& met = batch_.landings[packet.ray[lane]];
+      landing.part[lane] = met.part;
+      landing.to_plane[lane] = met.to_plane;
+      for (int axis = 0; axis < 3; ++axis) landing.normal[axis][lane] = met.normal[axis];
+    }
+  }
+
+  /// Repeats the step that leaves the extent or meets a surface, with the length that ends there.
   HWY_NOINLINE void land(Packet& packet) {
     packet.vectors = packet_rays / lanes;
     for (int lane = static_cast<int>(hwy::PopCount(packet.alive)); lane < packet_rays; ++lane)
       copy_state<differentials>(packet.next, 0, packet.next, lane);
     compact(packet);
     FaceLanding landing;
+    landing.on_surfaces = !batch_.landings.empty();
+    if (landing.on_surfaces) set_planes(packet, landing);
     aim_along_chord(medium_, packet, landing);
     aim_along_path(medium_, packet, landing);
     take_step<components, differentials>(medium_, packet);
@@ -383,6 +399,7 @@ int lane_count() { return KERNEL_DISPATCH(vector_lanes)(); }
 
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
   const PacketMedium medium(field, settings);
+  if (settings.geometry) batch.landings.assign(batch.rays.size(), {});
   [[maybe_unused]] const WithoutDenormals guard;
   return KERNEL_DISPATCH(trace)(medium, batch);
 }

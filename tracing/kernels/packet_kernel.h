@@ -27,6 +27,7 @@ struct KernelRay {
   std::uint32_t steps = 0;         ///< Number of steps; the kernel adds to it.
   float log_radiance_scale = 0;    ///< Λ in the kernel; not of rays with differentials.
   std::int8_t axis = -1;           ///< Axis of the face of the extent where the ray left; -1: it has not left.
+                                   ///< `on_surface`: it is on a surface.
   float step = 0;                  ///< If the ray has not left: length of its next step, world units.
   bool lands = false;              ///< Whether this step meets a surface. Without it, the step would end at
   std::array<float, 3> end{}, end_direction{};  ///< a position as that of `place`, with this direction.
@@ -37,8 +38,20 @@ struct KernelDifferential {
   float position[2][3], direction[2][3];
 };
 
+constexpr std::int8_t on_surface = 3;
+
+/// Where a step of a ray meets a surface first.
+struct SurfaceLanding {
+  Hit hit;
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< Of the surface; world.
+  std::array<float, 3> normal{};                    ///< Of the surface in index space, any length,
+  float to_plane = 0;  ///< the way along it from the beginning of the step to the surface, and
+  float part = 0;      ///< about how much of the step is taken until then. 0: it meets nothing.
+};
+
 struct KernelRays {
   std::vector<KernelRay> rays;
+  std::vector<SurfaceLanding> landings;           ///< One for every ray if there are surfaces, set by the kernel.
   std::vector<KernelDifferential> differentials;  ///< One for every ray, or empty.
   std::vector<std::vector<StepPoint>*> points;    ///< One list for every ray, to which the kernel adds; or empty.
 };
@@ -49,16 +62,16 @@ struct KernelSettings {
   float tolerance = 0;        ///< Of automatic steps, voxels.
   std::uint32_t max_steps = 0;
   float max_length = 0;                ///< World units; limit of the whole path, `KernelRay::length` included.
-  const Geometry* geometry = nullptr;  ///< Packets do not take steps that meet its surfaces. Null: none in the field.
+  const Geometry* geometry = nullptr;  ///< Its surfaces end steps. Null: none in the field.
   Eigen::AlignedBox3d surfaces;        ///< Box around these surfaces, index space.
 };
 
-/// Traces every ray to the face of the extent where it leaves (then `axis` is set and the ray is on that face), or to
-/// the point before a step that the kernel does not take. These are steps onto a surface, beyond the greatest length or
+/// Traces every ray to the face of the extent where it leaves, or to a surface (then `axis` is set and the ray is
+/// there), or to the point before a step that the kernel does not take. These are steps beyond the greatest length or
 /// number of steps, those that leave the extent between their ends or across its edges, and where σ·T cannot be
-/// followed; for rays with differentials, also all steps out of the extent. The result of a ray depends on that ray
-/// alone, not on its neighbours. Tracing is fastest if rays of one origin, or of neighbouring origins, stand next to
-/// each other.
+/// followed; for rays with differentials, also all steps onto a surface or out of the extent. The result of a ray
+/// depends on that ray alone, not on its neighbours. Tracing is fastest if rays of one origin, or of neighbouring
+/// origins, stand next to each other.
 /// @param field  Cubic.
 /// @return the number of tensor samples.
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch);

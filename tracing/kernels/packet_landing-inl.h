@@ -1,11 +1,21 @@
 /// @file tracing/kernels/packet_landing-inl.h
-/// The last step of rays in the extent, which ends on a face of the extent, and the path within a step.
+/// The last step of rays in the extent, which ends on a face of the extent or on a surface, and the path within a step.
 
 /// The last step of rays: the length of the whole step, which is too long, its chord, and the axis of the face where
-/// they leave.
+/// they leave; or `on_surface`, and the plane (SurfaceLanding).
 struct alignas(64) FaceLanding {
   PerRay longest, chord[3], axis;
+  PerRay normal[3], to_plane, part;
+  bool on_surfaces;  // Whether any ray may end on a surface; otherwise the line above is not set.
 };
+
+/// The component of v along a ray's axis, or along the normal of its plane.
+HWY_INLINE F across_plane(const FaceLanding& landing, const F3& v, int at) {
+  const F axis = load(landing.axis, at);
+  const F along = hn::IfThenElse(hn::Eq(axis, hn::Zero(floats)), v.x, hn::IfThenElse(hn::Eq(axis, set(1)), v.y, v.z));
+  if (!landing.on_surfaces) return along;
+  return hn::IfThenElse(hn::Eq(axis, set(on_surface)), dot(load(landing.normal, at), v), along);
+}
 
 /// Position, along an axis, of the extent's face through which rays along `chord` leave.
 HWY_INLINE F face(const PacketMedium& medium, const Packet& packet, const FaceLanding& landing, int axis, int at) {
@@ -29,21 +39,33 @@ static HWY_NOINLINE void aim_along_chord(const PacketMedium& medium, Packet& pac
     const F x = part(0), y = part(1), z = part(2), nearest = hn::Min(hn::Min(x, y), z);
     store(hn::IfThenElse(hn::Eq(x, nearest), zero, hn::IfThenElse(hn::Eq(y, nearest), one, set(2))), landing.axis, i);
     store(hn::Mul(longest, hn::Min(hn::Max(nearest, zero), one)), packet.time, i);
+    if (!landing.on_surfaces) continue;
+    const F met = load(landing.part, i);
+    const Mask meets = hn::Gt(met, zero);
+    store(hn::IfThenElse(meets, set(on_surface), load(landing.axis, i)), landing.axis, i);
+    store(hn::IfThenElse(meets, hn::Mul(longest, met), load(packet.time, i)), packet.time, i);
   }
+}
+
+/// The way from points of the steps to their faces or planes, across these.
+HWY_INLINE F way_to_plane(const PacketMedium& medium, const Packet& packet, const FaceLanding& landing, const F3& from,
+                          int at) {
+  const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, at); };
+  const F way = across_plane(landing, sub({on_face(0), on_face(1), on_face(2)}, from), at);
+  if (!landing.on_surfaces) return way;
+  const F rest = hn::Sub(load(landing.to_plane, at), across_plane(landing, sub(from, load(packet.now.p, at)), at));
+  return hn::IfThenElse(hn::Eq(load(landing.axis, at), set(on_surface)), rest, way);
 }
 
 /// Improves the lengths by the path between the ends of the whole step.
 static HWY_NOINLINE void aim_along_path(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
   const F one = set(1), two = set(2), three = set(3);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F longest = load(landing.longest, i), axis = load(landing.axis, i);
-    const auto of_axis = [&](const F3& v) HWY_ATTR {
-      return hn::IfThenElse(hn::Eq(axis, hn::Zero(floats)), v.x, hn::IfThenElse(hn::Eq(axis, one), v.y, v.z));
-    };
-    const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, i); };
-    const F from = of_axis(load(packet.now.p, i)), way = hn::Sub(of_axis(load(packet.next.p, i)), from);
-    const F gap = hn::Sub(of_axis({on_face(0), on_face(1), on_face(2)}), from);
-    const F a = hn::Mul(longest, of_axis(load(packet.now.u, i))), b = hn::Mul(longest, of_axis(load(packet.next.u, i)));
+    const F longest = load(landing.longest, i);
+    const auto across = [&](const F3& v) HWY_ATTR { return across_plane(landing, v, i); };
+    const F way = across(sub(load(packet.next.p, i), load(packet.now.p, i)));
+    const F gap = way_to_plane(medium, packet, landing, load(packet.now.p, i), i);
+    const F a = hn::Mul(longest, across(load(packet.now.u, i))), b = hn::Mul(longest, across(load(packet.next.u, i)));
     // The path is a t + (3 way − 2 a − b) t² + (a + b − 2 way) t³.
     const F square = hn::Sub(hn::MulSub(three, way, hn::Mul(two, a)), b), cube = hn::NegMulAdd(two, way, hn::Add(a, b));
     F t = hn::Div(load(packet.time, i), longest);
@@ -58,17 +80,12 @@ static HWY_NOINLINE void aim_along_path(const PacketMedium& medium, Packet& pack
   }
 }
 
-/// Moves the rays straight to their faces, but not those nearly parallel to them.
+/// Moves the rays straight to their faces or planes, but not those nearly parallel to them.
 static HWY_NOINLINE void move_to_faces(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F zero = hn::Zero(floats), axis = load(landing.axis, i);
-    const auto of_axis = [&](F a, F b, F c) HWY_ATTR {
-      return hn::IfThenElse(hn::Eq(axis, zero), a, hn::IfThenElse(hn::Eq(axis, set(1)), b, c));
-    };
-    const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, i); };
     const F3 to = load(packet.next.p, i), u = load(packet.next.u, i);
-    const F gap = hn::Sub(of_axis(on_face(0), on_face(1), on_face(2)), of_axis(to.x, to.y, to.z));
-    const F way = hn::Div(gap, of_axis(u.x, u.y, u.z));
+    const F gap = way_to_plane(medium, packet, landing, to, i);
+    const F way = hn::Div(gap, across_plane(landing, u, i));
     const F rest = hn::IfThenElseZero(hn::Le(hn::Abs(way), load(landing.longest, i)), way);
     store(mul_add(rest, u, to), packet.next.p, i);
     store(hn::Add(load(packet.time, i), rest), packet.time, i);

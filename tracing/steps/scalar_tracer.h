@@ -48,9 +48,10 @@ class Tracer {
   /// @param record    The points on its path are added to it; null: the ray is not recorded.
   RayEnd trace(const State<N>& start, double strength, PathPoints* record) {
     medium_.strength = strength;
-    const auto end = approach(start, record);
+    auto end = approach(start, record);
     if (!std::isfinite(strength)) return RayEnd::degenerate;
-    return end ? *end : follow();
+    while (!end) end = follow();
+    return *end;
   }
 
   /// Follows a ray to the point where it begins to bend. Returns nothing there; if the ray ends first, returns why.
@@ -63,13 +64,14 @@ class Tracer {
     if (direction().isZero() || !position().allFinite()) return RayEnd::degenerate;
     if (!field_.contains(position()))
       if (const auto end = reach_box()) return end;
-    if (geometry_.inside_cut(position())) return std::nullopt;
+    if (geometry_.inside_cut(position(), direction())) return std::nullopt;
     const auto end = cross_box();
     if (!end) ++steps_;
     return end;
   }
 
-  /// Continues a ray at `state`. Call `follow` next if it bends there, or `leave` if it is on the face of the box.
+  /// Continues a ray at `state`. Call `follow` next if it bends there, `leave` if it is on the face of the box, or
+  /// `leave_cut`.
   void take_over(const State<N>& state, double strength, const Travelled& travelled, PathPoints* record) {
     ray_ = state;
     record_ = record;
@@ -79,18 +81,29 @@ class Tracer {
     steps_ = travelled.steps;
   }
 
-  /// Follows the ray from a point in the field to its end. `first_step` is the length of the first step, world units;
+  /// Follows the ray from a point in the field to its end, or to where it has left the cut and enters it again; then
+  /// returns nothing. `first_step` is the length of the first step, world units;
   /// 0: as any other step. `first_end` is where this step of `splitting4` would end, in single precision; null: not
   /// known. Where it tells what the step meets, only the part of the step up to there is taken.
-  RayEnd follow(double first_step = 0, const State<N>* first_end = nullptr) {
-    while (true) {
-      if (const auto end = bend(first_step, first_end)) return *end;
-      ++steps_;
-      first_step = 0;
-      first_end = nullptr;
-      if (const auto end = cross_box()) return *end;
-      ++steps_;
+  std::optional<RayEnd> follow(double first_step = 0, const State<N>* first_end = nullptr) {
+    const double before = length_;
+    const auto end = bend(first_step, first_end);
+    return end ? end : leave_cut(length_ - before);
+  }
+
+  /// Follows the ray from the cut, through free space, to its end or to where it enters the cut again; then returns
+  /// nothing. A ray that grazes the cut might enter and leave it at one point for ever, as chords do not go quite the
+  /// way of light: it is moved on, a little more after each step. @param way  Its length since it entered the cut.
+  std::optional<RayEnd> leave_cut(double way) {
+    ++steps_;
+    if (way <= geometry_.margin()) {
+      Hit ahead;
+      ahead.distance = geometry_.margin() * steps_;
+      if (const auto end = reach(ahead)) return end;
     }
+    const auto end = cross_box();
+    if (!end) ++steps_;
+    return end;
   }
 
   /// Follows the ray from a face of the volume, through free space, to its end.

@@ -10,8 +10,9 @@
 #include "tracing/steps/scalar_tracer.h"
 
 // Rays are traced in packets (packet_kernel.h) inside the field. The scalar tracer (scalar_tracer.h) does the rest, ray
-// by ray: the way to the field and behind it, steps that end on surfaces or are too short for single precision, and the
-// last step of rays with differentials. Where packets cannot trace a batch, it does all.
+// by ray: the way to the field and behind it, steps that are too short for single precision, and the last step of rays
+// with differentials. Rays that leave the cut and enter it again are then traced in packets again. Where packets cannot
+// trace a batch, the scalar tracer does all.
 
 namespace tensorray {
 namespace {
@@ -45,11 +46,13 @@ KernelSettings kernel_settings(const TensorField& field, const Geometry& geometr
   return result;
 }
 
-/// A batch while it is traced.
+/// Rays of a batch that bend at the same time: from their entry into the field, or from a later one into the cut.
 struct TracedBatch {
   packets::KernelRays kernel;
   std::vector<std::size_t> numbers;  // Number, in the batch, of each ray of the kernel.
   std::vector<Travelled> travelled;  // State of each ray before the kernel.
+  bool enters_again = false;
+  std::vector<std::vector<StepPoint>> points;  // Of rays that are recorded and enter again.
 };
 
 Eigen::Vector3d to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
@@ -86,7 +89,7 @@ template <int N>
 State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, std::size_t i) {
   const KernelRay& ray = kernel.rays[i];
   Eigen::Vector3d index = index_position(ray.place);
-  if (ray.axis >= 0) {
+  if (ray.axis >= 0 && ray.axis < packets::on_surface) {
     const Eigen::AlignedBox3d& box = field.index_bounds();
     const int axis = ray.axis;
     const double face = index[axis] > box.center()[axis] ? box.max()[axis] : box.min()[axis];
@@ -127,6 +130,21 @@ bool same_start(const RayBatch& batch, std::size_t i, std::size_t j) {
 /// Where a ray is recorded before the kernel.
 PathPoints* before(RayRecord* records, std::size_t i) { return records ? &records[i].before : nullptr; }
 
+/// Adds a ray to those of the kernel. @param ray  At the tracer's point.
+template <int N>
+void add_ray(const TensorField& field, const Tracer<N>& tracer, KernelRay ray, double strength, std::size_t number,
+             TracedBatch& traced) {
+  const Travelled travelled = tracer.travelled();
+  ray.strength = static_cast<float>(strength);
+  ray.length = travelled.length;
+  ray.steps = travelled.steps;
+  ray.log_radiance_scale = static_cast<float>(tracer.state().log_radiance_scale);
+  traced.kernel.rays.push_back(ray);
+  if constexpr (N == 3) traced.kernel.differentials.push_back(kernel_differential(field, tracer.state()));
+  traced.numbers.push_back(number);
+  traced.travelled.push_back(travelled);
+}
+
 /// Moves the rays of the batch to the points where they begin to bend; rays of one origin are moved together. Sets the
 /// end of rays that do not reach the field.
 template <int N>
@@ -152,13 +170,7 @@ void approach(const TensorField& field, const BendingSettings& settings, RayBatc
         ray.norm = static_cast<float>(tracer.deviator_here());
         sampled = true;
       }
-      ray.strength = static_cast<float>(strength);
-      ray.length = travelled.length;
-      ray.steps = travelled.steps;
-      traced.kernel.rays.push_back(ray);
-      if constexpr (N == 3) traced.kernel.differentials.push_back(kernel_differential(field, state));
-      traced.numbers.push_back(i);
-      traced.travelled.push_back(travelled);
+      add_ray(field, tracer, ray, strength, i, traced);
       if (!records) continue;
       tracer.take_over(state, strength, travelled, before(records, i));
       tracer.record(true);
@@ -166,27 +178,88 @@ void approach(const TensorField& field, const BendingSettings& settings, RayBatc
   }
 }
 
-/// Follows ray i of the kernel from the point where the kernel stopped to its end.
+/// Where ray i of the kernel is recorded from the point on where the kernel stopped; null: it is not recorded.
+PathPoints* behind(const TensorField& field, const TracedBatch& traced, std::size_t i, bool is_left,
+                   RayRecord* records) {
+  if (!records) return nullptr;
+  RayRecord& record = records[traced.numbers[i]];
+  if (traced.enters_again)
+    for (const StepPoint& step : traced.points[i])
+      record.behind.push_back(path_point(field, step, traced.travelled[i].length));
+  if (is_left) return &record.behind;
+  // The last point is recorded again.
+  if (traced.enters_again)
+    record.behind.pop_back();
+  else
+    record.steps.empty() ? record.before.pop_back() : record.steps.pop_back();
+  return &record.behind;
+}
+
+/// Continues a ray that the kernel has left on a surface.
 template <int N>
-RayEnd finish(const TensorField& field, const TracedBatch& traced, std::size_t i, double strength, RayRecord* records,
-              Tracer<N>& tracer) {
+std::optional<RayEnd> finish_on_surface(const packets::SurfaceLanding& landing, double way, Tracer<N>& tracer) {
+  if (landing.hit.surface == Surface::plate) return RayEnd::plate;
+  if (landing.hit.surface == Surface::obstacle) return RayEnd::obstacle;
+  return tracer.leave_cut(way);
+}
+
+/// Moves a point in single precision onto a surface.
+template <int N>
+void move_to_surface(const packets::SurfaceLanding& landing, State<N>& state) {
+  const Eigen::Vector3d& normal = landing.hit.normal;
+  const double slope = normal.dot(state.direction());
+  if (std::abs(slope) > 0.1) state.P.col(0) += normal.dot(landing.point - state.position()) / slope * state.V.col(0);
+}
+
+/// Follows ray i of the kernel from the point where the kernel stopped to its end, or to where it enters the cut again;
+/// then returns nothing.
+template <int N>
+std::optional<RayEnd> finish(const TensorField& field, const TracedBatch& traced, std::size_t i, double strength,
+                             RayRecord* records, Tracer<N>& tracer) {
   const KernelRay& ray = traced.kernel.rays[i];
-  const std::size_t number = traced.numbers[i];
   Travelled travelled = traced.travelled[i];
+  const double way = ray.length - travelled.length;
   travelled.length = ray.length;
   travelled.steps = ray.steps;
-  RayRecord* const record = records ? &records[number] : nullptr;
-  tracer.take_over(state_of<N>(field, traced.kernel, i), strength, travelled, record ? &record->behind : nullptr);
+  PathPoints* const record = behind(field, traced, i, ray.axis >= 0, records);
+  State<N> state = state_of<N>(field, traced.kernel, i);
+  if (ray.axis == packets::on_surface) move_to_surface(traced.kernel.landings[i], state);
+  tracer.take_over(state, strength, travelled, record);
   if (ray.axis >= 0) {
     if (tracer.state().direction().isZero()) return RayEnd::degenerate;
     tracer.record(true);
-    return tracer.leave();
+    return ray.axis == packets::on_surface ? finish_on_surface(traced.kernel.landings[i], way, tracer) : tracer.leave();
   }
-  // The last point is recorded again.
-  if (record) record->steps.empty() ? record->before.pop_back() : record->steps.pop_back();
   const State<N> end = end_of_step<N>(field, ray);
   const bool is_known = ray.lands && end.P.allFinite() && !end.direction().isZero();
   return tracer.follow(double{ray.step}, is_known ? &end : nullptr);
+}
+
+/// Traces rays that are in the field to their ends. @return those that have left the cut and entered it again.
+template <int N>
+TracedBatch trace_once(const TensorField& field, const KernelSettings& settings, const BendingSettings& bending,
+                       TracedBatch& traced, RayBatch& batch, RayRecord* records, Tracer<N>& tracer) {
+  if (traced.enters_again) traced.points.resize(records ? traced.numbers.size() : 0);
+  for (std::size_t i = 0; records && i < traced.numbers.size(); ++i)
+    traced.kernel.points.push_back(traced.enters_again ? &traced.points[i] : &records[traced.numbers[i]].steps);
+  batch.tensor_samples += packets::run(field, settings, traced.kernel);
+  TracedBatch again;
+  again.enters_again = true;
+  for (std::size_t i = 0; i < traced.numbers.size(); ++i) {
+    const std::size_t number = traced.numbers[i];
+    const double strength = strength_of(batch, number, bending);
+    auto end = finish(field, traced, i, strength, records, tracer);
+    if (!end && tracer.travelled().steps >= settings.max_steps) end = RayEnd::step_limit;
+    if (end) {
+      set_end(batch, number, *end, tracer);
+      continue;
+    }
+    KernelRay ray = kernel_ray(field, tracer);
+    if (may_be_strong(field, ray, strength)) ray.norm = static_cast<float>(tracer.deviator_here());
+    tracer.record(true);
+    add_ray(field, tracer, ray, strength, number, again);
+  }
+  return again;
 }
 
 template <int N>
@@ -194,14 +267,10 @@ void trace_in_packets(const TensorField& field, const Geometry& geometry, const 
                       RayBatch& batch, RayRecord* records, Tracer<N>& tracer) {
   TracedBatch traced;
   approach(field, settings, batch, records, tracer, traced);
-  if (records)
-    for (const std::size_t number : traced.numbers) traced.kernel.points.push_back(&records[number].steps);
-  batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), traced.kernel);
-  for (std::size_t i = 0; i < traced.numbers.size(); ++i) {
-    const std::size_t number = traced.numbers[i];
-    const RayEnd end = finish(field, traced, i, strength_of(batch, number, settings), records, tracer);
-    set_end(batch, number, end, tracer);
-  }
+  const KernelSettings of_kernel = kernel_settings(field, geometry, settings);
+  do {
+    traced = trace_once(field, of_kernel, settings, traced, batch, records, tracer);
+  } while (!traced.numbers.empty());
 }
 
 template <int N>

@@ -1,0 +1,292 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "tests/tracing/support.h"
+
+// Rays through closed meshes of all kinds, as the cut of a volume. Light is straight but for rounding (σ T ~ 1e-9), so
+// that its way within a body of convex parts is known: that of their union.
+
+namespace tensorray::test {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+/// Closed, convex and outwards.
+using Parts = std::vector<TriangleMesh>;
+
+TriangleMesh joined(const Parts& parts) {
+  TriangleMesh all;
+  for (const TriangleMesh& part : parts) {
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
+    for (const auto& t : part.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  return all;
+}
+
+TriangleMesh box_part(const Vector3d& low, const Vector3d& high) {
+  return box_mesh(Eigen::AlignedBox3d(low, high), Eigen::Affine3d::Identity());
+}
+
+/// The same box with the other diagonal on each face, which mirroring makes.
+TriangleMesh mirrored_part(const Vector3d& low, const Vector3d& high) {
+  TriangleMesh box = box_part({-high.x(), low.y(), low.z()}, {-low.x(), high.y(), high.z()});
+  for (Vector3d& vertex : box.vertices) vertex.x() = -vertex.x();
+  for (auto& triangle : box.triangles) std::swap(triangle[0], triangle[1]);
+  return box;
+}
+
+/// Rings of latitude about a centre; a pole is a vertex of many triangles.
+TriangleMesh ball_part(const Vector3d& center, double radius) {
+  constexpr std::uint32_t around = 16, rings = 7;
+  TriangleMesh ball;
+  for (std::uint32_t ring = 1; ring <= rings; ++ring)
+    for (std::uint32_t i = 0; i < around; ++i) {
+      const double polar = M_PI * ring / (rings + 1), angle = 2 * M_PI * i / around;
+      ball.vertices.push_back(center + radius * Vector3d(std::sin(polar) * std::cos(angle),
+                                                         std::sin(polar) * std::sin(angle), std::cos(polar)));
+    }
+  const std::uint32_t top = rings * around, bottom = top + 1;
+  ball.vertices.push_back(center + Vector3d(0, 0, radius));
+  ball.vertices.push_back(center - Vector3d(0, 0, radius));
+  for (std::uint32_t i = 0; i < around; ++i) {
+    const std::uint32_t next = (i + 1) % around, last = (rings - 1) * around;
+    ball.triangles.push_back({top, i, next});
+    ball.triangles.push_back({bottom, last + next, last + i});
+    for (std::uint32_t row = 0; row < last; row += around) {
+      ball.triangles.push_back({row + i, row + around + i, row + around + next});
+      ball.triangles.push_back({row + i, row + around + next, row + next});
+    }
+  }
+  return ball;
+}
+
+/// The cells of a box, each with its own faces, whose diagonals differ from cell to cell.
+Parts cells(const Vector3d& low, const Vector3d& high, int count) {
+  Parts parts;
+  const Vector3d edge = (high - low) / count;
+  for (int i = 0; i < count * count * count; ++i) {
+    const Vector3i cell(i / count / count, i / count % count, i % count);
+    const Vector3d from = low + cell.cast<double>().cwiseProduct(edge);
+    parts.push_back(cell.sum() % 2 ? mirrored_part(from, from + edge) : box_part(from, from + edge));
+  }
+  return parts;
+}
+
+/// Length of a line within a union of convex parts and within the volume, each part grown by `more` on all sides.
+double length_within(const Parts& parts, const Vector3d& from, const Vector3d& along, double more) {
+  const auto within = [&](const TriangleMesh& part, double grown) {
+    std::pair<double, double> range(-1e300, 1e300);
+    for (const auto& t : part.triangles) {
+      const Vector3d& a = part.vertices[t[0]];
+      const Vector3d normal = (part.vertices[t[1]] - a).cross(part.vertices[t[2]] - a).normalized();
+      const double gap = grown + normal.dot(a - from), slope = normal.dot(along);
+      if (slope < 0) range.first = std::max(range.first, gap / slope);
+      if (slope > 0) range.second = std::min(range.second, gap / slope);
+      if (slope == 0 && gap < 0) range.second = -1e300;
+    }
+    return range;
+  };
+  const auto volume = within(box_part(Vector3d::Constant(-1), Vector3d::Ones()), std::max(more, 0.0));
+  std::vector<std::pair<double, double>> ranges;
+  for (const TriangleMesh& part : parts) {
+    const auto range = within(part, more);
+    ranges.emplace_back(std::max(range.first, volume.first), std::min(range.second, volume.second));
+  }
+  std::sort(ranges.begin(), ranges.end());
+  double sum = 0, end = -1e300;
+  for (const auto& [first, last] : ranges) {
+    sum += std::max(0.0, last - std::max(first, end));
+    end = std::max(end, last);
+  }
+  return sum;
+}
+
+/// Length of a path where it bends.
+double bent_length(const PathPoints& points) {
+  double sum = 0;
+  for (std::size_t i = 1; i < points.size(); ++i)
+    if (points[i - 1].in_field && points[i].in_field) sum += points[i].length - points[i - 1].length;
+  return sum;
+}
+
+struct CutCase {
+  std::string name;
+  Parts parts;
+};
+
+std::vector<CutCase> cut_cases() {
+  const Vector3d half = Vector3d::Constant(0.5), one = Vector3d::Ones();
+  const auto column = [](double x, double width, bool mirrored = false) {
+    const Vector3d low(x, -0.5, -0.5), high(x + width, 0.5, 0.5);
+    return mirrored ? mirrored_part(low, high) : box_part(low, high);
+  };
+  Parts with_ball = cells(-half, half, 2);
+  with_ball.push_back(ball_part({0.25, 0, 0.5}, 0.4));
+  return {
+      {"a box", {box_part(-half, half)}},
+      {"a box that fills the volume", {box_part(-one, one)}},
+      {"a box beyond the volume", {box_part(-2 * one, 1.5 * one)}},
+      {"a layer of the volume", {box_part({-1, -1, -0.125}, {1, 1, 0.125})}},
+      {"a ball", {ball_part({0, 0, 0}, 0.75)}},
+      {"a box twice", {box_part(-half, half), box_part(-half, half)}},
+      {"a box twice, other diagonals", {box_part(-half, half), mirrored_part(-half, half)}},
+      {"touching boxes", {column(-0.5, 0.5), column(0, 0.5)}},
+      {"touching boxes, other diagonals", {column(-0.5, 0.5), column(0, 0.5, true)}},
+      {"overlapping boxes", {column(-0.5, 0.6), column(-0.1, 0.6, true)}},
+      {"boxes with an edge in common", {box_part(-half, {0, 0, 0.5}), box_part({0, 0, -0.5}, half)}},
+      {"boxes with a vertex in common", {box_part(-half, {0, 0, 0}), box_part({0, 0, 0}, half)}},
+      {"a box in a box", {box_part(-half, half), box_part(-half / 2, half / 2)}},
+      {"balls that touch", {ball_part({-0.4, 0, 0}, 0.4), ball_part({0.4, 0, 0}, 0.4)}},
+      {"cells that fill the volume", cells(-one, one, 4)},
+      {"cells and a ball", with_ball},
+  };
+}
+
+enum class LineKind { random, through_vertices, in_faces, grazing };
+
+/// A line through the volume, from outside.
+std::pair<Vector3d, Vector3d> a_line(LineKind kind, std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  std::uniform_int_distribution<int> grid(-8, 8), axis_of(0, 2), step(-1, 1);
+  const auto on_grid = [&] { return Vector3d(grid(random) / 8.0, grid(random) / 8.0, grid(random) / 8.0); };
+  Vector3d through = on_grid(), along = Vector3d::Zero();
+  const int axis = axis_of(random);
+  switch (kind) {
+    case LineKind::random:
+      through = 0.5 * Vector3d(normal(random), normal(random), normal(random));
+      along = Vector3d(normal(random), normal(random), normal(random));
+      break;
+    case LineKind::through_vertices:
+      while (along.isZero()) along = Vector3d(step(random), step(random), step(random));
+      break;
+    case LineKind::in_faces:
+      along = Vector3d(normal(random), normal(random), normal(random));
+      along[axis] = 0;
+      break;
+    case LineKind::grazing:
+      along = Vector3d(normal(random), normal(random), normal(random));
+      along[axis] = std::pow(10, -2 - 2 * std::abs(normal(random))) * step(random);
+      through[axis] += std::pow(10, -6 - 2 * std::abs(normal(random))) * step(random);
+      break;
+  }
+  along.normalize();
+  return {through - 4 * along, along};
+}
+
+class CutTest : public testing::TestWithParam<CutCase> {
+ protected:
+  static constexpr int per_kind = 1000;
+
+  static const TensorField& field() {
+    static const TensorField result(cube_grid(Vector3i::Constant(17), [](const Vector3d&) { return general_tensor(); }),
+                                    {Interpolation::cubic, Border::extend});
+    return result;
+  }
+
+  Geometry geometry() const {
+    Surfaces surfaces = surfaces_of(field());
+    surfaces.cut = joined(GetParam().parts);
+    return Geometry(std::move(surfaces));
+  }
+
+  static RayBatch lines(LineKind kind, double flexibility) {
+    RayBatch batch;
+    std::mt19937 random(7);
+    for (int i = 0; i < per_kind; ++i) {
+      const auto [from, along] = a_line(kind, random);
+      batch.add(from, along, flexibility);
+    }
+    return batch;
+  }
+};
+
+/// No ray stays at a surface, and straight light is in the body as far as the union of its parts reaches. What is
+/// within the margin of surfaces may count as either.
+TEST_P(CutTest, LightIsInTheBodyAsFarAsItReaches) {
+  const Geometry geometry = this->geometry();
+  const double near = 4 * geometry.margin();
+  for (const LineKind kind : {LineKind::random, LineKind::through_vertices, LineKind::in_faces, LineKind::grazing}) {
+    const RayBatch start = lines(kind, 1e-9);
+    RayBatch batch = start;
+    std::vector<RayRecord> records;
+    trace(field(), geometry, {}, batch, &records);
+    int wrong = 0;
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      ASSERT_EQ(batch.end[i], RayEnd::missed) << i;
+      const auto expected = [&](double more) {
+        return length_within(GetParam().parts, start.position[i], start.direction[i], more);
+      };
+      const double length = bent_length(points_of(field(), records[i]));
+      const double least = expected(-near) - 10 * near, most = expected(near) + 10 * near;
+      if (length >= least && length <= most) continue;
+      if (++wrong < 4)
+        ADD_FAILURE() << "kind " << int(kind) << ", ray " << i << " from " << start.position[i].transpose() << " along "
+                      << start.direction[i].transpose() << ": " << length << " is not in [" << least << ", " << most
+                      << "]";
+    }
+    EXPECT_EQ(wrong, 0) << int(kind);
+  }
+}
+
+/// The same rays bend in packets as one by one, alone or with differentials. Of those that graze, rounding decides.
+TEST_P(CutTest, PacketsAgreeWithTheReference) {
+  const Geometry geometry = this->geometry();
+  for (const LineKind kind : {LineKind::random, LineKind::through_vertices, LineKind::in_faces, LineKind::grazing}) {
+    RayBatch packets = lines(kind, 0.3), reference = packets, with_differentials = packets;
+    with_differentials.differentials.resize(packets.size());
+    trace(field(), geometry, {}, packets);
+    trace_reference(field(), geometry, {}, reference);
+    trace(field(), geometry, {}, with_differentials);
+    int differ = 0;
+    for (std::size_t i = 0; i < packets.size(); ++i) {
+      ASSERT_EQ(packets.end[i], RayEnd::missed) << i;
+      ASSERT_EQ(reference.end[i], RayEnd::missed) << i;
+      ASSERT_EQ(with_differentials.end[i], RayEnd::missed) << i;
+      differ += (packets.direction[i] - reference.direction[i]).norm() > 2e-5;
+      differ += (with_differentials.direction[i] - reference.direction[i]).norm() > 2e-5;
+    }
+    EXPECT_LE(differ, kind == LineKind::random ? 2 : per_kind / 20) << int(kind);
+  }
+}
+
+/// Inner faces, and surfaces that are there twice, change nothing.
+TEST(CutWithInnerFaces, BendsLightAsItsSkinDoes) {
+  const TensorField field(cube_grid(Vector3i::Constant(17), linear_tensor), {Interpolation::cubic, Border::extend});
+  const Vector3d half = Vector3d::Constant(0.5);
+  RayBatch skin, inner;
+  std::mt19937 random(9);
+  for (int i = 0; i < 5000; ++i) {
+    const auto [from, along] = a_line(LineKind::random, random);
+    skin.add(from, along, 0.2);
+  }
+  inner = skin;
+  for (RayBatch* const batch : {&skin, &inner}) {
+    Surfaces surfaces = surfaces_of(field);
+    surfaces.cut = batch == &skin ? box_part(-half, half) : joined(cells(-half, half, 3));
+    trace(field, Geometry(std::move(surfaces)), {}, *batch);
+  }
+  for (std::size_t i = 0; i < skin.size(); ++i) {
+    ASSERT_EQ(inner.end[i], RayEnd::missed);
+    EXPECT_LT((skin.direction[i] - inner.direction[i]).norm(), 1e-5) << i;
+  }
+}
+
+std::string name_of(const testing::TestParamInfo<CutCase>& info) {
+  std::string name;
+  for (const char c : info.param.name)
+    if (std::isalnum(static_cast<unsigned char>(c))) name += c;
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Bodies, CutTest, testing::ValuesIn(cut_cases()), name_of);
+
+}  // namespace
+}  // namespace tensorray::test
