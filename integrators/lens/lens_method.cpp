@@ -126,10 +126,14 @@ Image side_by_side(const std::vector<Image>& images) {
   return all;
 }
 
-void add_statistics(const LensPicture& picture, Statistics& statistics) {
+/// @param starts  Of the map.
+void add_statistics(const LensPicture& picture, std::size_t starts, Statistics& statistics) {
+  statistics.emitted.resize(picture.ends.size());
   statistics.ends.resize(picture.ends.size());
-  for (std::size_t channel = 0; channel < picture.ends.size(); ++channel)
+  for (std::size_t channel = 0; channel < picture.ends.size(); ++channel) {
+    statistics.emitted[channel] += starts;
     for (int end = 0; end < ray_end_count; ++end) statistics.ends[channel][end] += picture.ends[channel][end];
+  }
   statistics.ray_steps += picture.counts.ray_steps;
   statistics.tensor_samples += picture.counts.tensor_samples;
   statistics.seconds_drawing += picture.seconds_drawing;
@@ -197,7 +201,7 @@ void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const P
   if (settings_.obstacles == ObstacleLook::shaded)
     draw_obstacles(scene.geometry.surfaces(), light.setup, settings_.samples, all.pictures.back());
   if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, all.pictures.back());
-  add_statistics(picture, all.statistics);
+  add_statistics(picture, light.map.starts.size(), all.statistics);
   all.statistics.seconds_tracing += light.seconds_tracing;
   if (by_channel)
     // A white image has the radiance of a white diffuse surface in the scene's light.
@@ -210,8 +214,7 @@ Render LoadedLens::render_of(const Scene& scene, LensPictures all) const {
   result.linear = side_by_side(all.pictures);
   if (!all.spectra.empty()) result.spectral = spectra_side_by_side(std::move(all.spectra));
   result.statistics = std::move(all.statistics);
-  for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)])
-    result.statistics.positions += count;
+  result.statistics.positions = result.statistics.emitted[reference_channel(scene)];
   result.metadata["tensorray:end"] = end_codes();
   result.view = picture_view(lens_.receiver);
   result.exposure = 0;  // Shows the colours of the image unchanged.

@@ -11,10 +11,8 @@ namespace {
 
 void warn_of_step_limit(Render& render) {
   std::uint64_t emitted = 0, limited = 0;
-  for (const EndCounts& counts : render.statistics.ends) {
-    for (const std::uint64_t count : counts) emitted += count;
-    limited += counts[static_cast<int>(RayEnd::step_limit)];
-  }
+  for (const std::uint64_t count : render.statistics.emitted) emitted += count;
+  for (const EndCounts& counts : render.statistics.ends) limited += counts[static_cast<int>(RayEnd::step_limit)];
   if (100 * limited > emitted)
     render.warnings.push_back(fmt::format("{:.0f}% of the rays were given up after `bending.max_steps` steps; raise it",
                                           100.0 * static_cast<double>(limited) / static_cast<double>(emitted)));
