@@ -10,6 +10,7 @@
 #include "renderer/charts/grid_lines.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/outputs/body_outline.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/scene.h"
@@ -212,6 +213,13 @@ void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const P
 Render LoadedLens::render_of(const Scene& scene, LensPictures all) const {
   Render result;
   result.linear = side_by_side(all.pictures);
+  const std::vector<OutlineStroke> outline = body_outline(scene, lens_.receiver);
+  const int width = all.pictures.front().width, count = static_cast<int>(all.pictures.size());
+  for (int i = 0; i < count; ++i)
+    for (const OutlineStroke& each : outline) {
+      const Eigen::Vector2d right(i * (result.linear.width - width) / std::max(1, count - 1), 0);
+      result.outline.push_back({each.from + right, each.to + right, each.is_hidden});
+    }
   if (!all.spectra.empty()) result.spectral = spectra_side_by_side(std::move(all.spectra));
   result.statistics = std::move(all.statistics);
   result.statistics.positions = result.statistics.emitted[reference_channel(scene)];

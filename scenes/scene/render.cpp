@@ -26,6 +26,10 @@ void warn_of_annotations(const Scene& scene, Render& render) {
     render.warnings.push_back(
         "`/output/annotations`: a picture of a perspective camera has no single scale, and gets no scale bar; choose "
         "the `/camera/projection` \"orthographic\"");
+  if ((output.wants(Annotation::body) || output.wants(Annotation::hidden)) && render.outline.empty())
+    render.warnings.push_back(
+        "`/output/annotations`: there are no lines of a body: light on a plate and a lens have them, where the field "
+        "has a surface (`/field/bounds`) or there are `/obstacles`");
   if (output.wants(Annotation::legend) && !render.draw_legend && !render.display)
     render.warnings.push_back(
         fmt::format("`/output/annotations`: this picture of {} has no colours with a meaning, and gets no legend",

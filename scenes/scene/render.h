@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "base/process/job.h"
+#include "renderer/charts/annotations.h"
 #include "renderer/film/film.h"
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
@@ -70,7 +71,8 @@ struct Render {
   ImageMetadata metadata;                 ///< Entries of the method for the headers of its files.
   /// Writes the tubes about `paths`; empty unless the scene asks for them.
   std::function<void(const std::filesystem::path&, const std::vector<Path>& paths)> write_tubes;
-  std::optional<PictureView> view;  ///< Of `linear`; none: there is no picture.
+  std::vector<OutlineStroke> outline;  ///< Lines of bodies, in pixels of the picture, if annotations want them.
+  std::optional<PictureView> view;     ///< Of `linear`; none: there is no picture.
   /// Draws a legend over a scene-linear picture whose exposure is so many stops; empty: no legend.
   std::function<void(Image&, double exposure)> draw_legend;
   Statistics statistics;

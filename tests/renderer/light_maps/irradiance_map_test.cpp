@@ -25,8 +25,7 @@ TEST(IrradianceMapTest, AUniformPlateIsUniformToItsEdge) {
     const IrradianceMap map = map_of(std::vector<float>(static_cast<std::size_t>(width * height), 3), width, height);
     for (double x = 0; x <= width; x += 0.125)
       for (double y = 0; y <= height; y += 0.125) EXPECT_NEAR(irradiance_at(map, x, y), 3, 1e-12) << x << " " << y;
-    for (const double beside : {-0.1, 0.1})
-      EXPECT_EQ(irradiance_at(map, beside < 0 ? beside : width + beside, height / 2.0), 0) << beside;
+    EXPECT_EQ(irradiance_at(map, -0.1, height / 2.0) + irradiance_at(map, width + 0.1, height / 2.0), 0);
   }
 }
 
