@@ -71,7 +71,11 @@ inline Choices<LightCaustic> choices(LightCaustic) {
 }
 
 inline Choices<Annotation> choices(Annotation) {
-  return {{"scale", Annotation::scale}, {"axes", Annotation::axes}, {"legend", Annotation::legend}};
+  return {{"scale", Annotation::scale},
+          {"axes", Annotation::axes},
+          {"legend", Annotation::legend},
+          {"body", Annotation::body},
+          {"hidden", Annotation::hidden}};
 }
 
 inline Choices<Pattern> choices(Pattern) { return {{"none", Pattern::none}, {"checkerboard", Pattern::checkerboard}}; }

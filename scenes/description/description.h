@@ -220,7 +220,7 @@ struct IntegratorDescription {
 };
 
 /// What is drawn over `image`.
-enum class Annotation { scale, axes, legend };
+enum class Annotation { scale, axes, legend, body, hidden };
 
 struct OutputDescription {
   std::vector<Output> kinds;                           ///< All kinds of output that any method can write.

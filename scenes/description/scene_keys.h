@@ -203,7 +203,8 @@ inline void describe(OutputDescription& output, KeyVisitor& visit) {
   visit("display", output.display, "OpenColorIO display; default: that of the config", knob());
   visit("view", output.view,
         "OpenColorIO view; default: Soft highlights for light on a plate, otherwise that of the display", knob());
-  visit("annotations", output.annotations, "what is drawn over `image`: a scale bar, the world's axes, a legend");
+  visit("annotations", output.annotations,
+        "what is drawn over `image`: a scale bar, the world's axes, a legend, the lines of bodies");
   visit("caption", output.caption, "a line over `image`; {field.scale} is the value of a key, # counts frames");
 }
 
