@@ -97,7 +97,7 @@ const std::vector<Room> rooms{
     {"tools/import/lattice_files", {"tools/import/lattices", "volumes/*"}},
     {"tools/import/meshes", {"tools/import/lattices", "volumes/*"}},
     {"tools/import/sampling", {"tools/import/meshes", "volumes/*"}},
-    {"tools/import/vtk", {"tools/import/lattices", "volumes/*"}},
+    {"tools/import/vtk", {"tools/import/lattices", "tools/import/meshes", "volumes/*"}},
     {"tools/import/vtk_formats", {"tools/import/lattices", "tools/import/vtk", "volumes/*"}},
     {"tools/import/cases", {"tools/import/vtk", "tools/import/vtk_formats", "volumes/*"}},
     {"tools/import/hdf5", {"tools/import/vtk", "volumes/*"}},

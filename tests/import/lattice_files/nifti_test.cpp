@@ -77,6 +77,31 @@ Affine3d oblique(double sign) {
 
 const Matrix3d flip_x = Vector3d(-1, 1, 1).asDiagonal();
 
+/// dipy's quadratic form, as nibabel writes an array (X, Y, Z, 3, 3): by columns, in the axes of the voxels.
+TEST(Nifti, MatricesAlongTwoAxesAreInTheAxesOfTheVoxelsAndItIsSaid) {
+  const Matrix3d T = (Matrix3d() << 1, 2, 3, 4, 5, 6, 7, 8, 10).finished();
+  for (const double sign : {1, -1}) {
+    const Affine3d transform = oblique(sign);
+    nifti_1_header header = header_of({2, 3, 2}, 3, transform);
+    header.dim[0] = 5, header.dim[5] = 3;
+    std::vector<float> columns;
+    for (int i = 0; i < 9; ++i) columns.push_back(static_cast<float>(T(i % 3, i / 3)));
+    const test::TemporaryFile file("five.nii",
+                                   file_of(header, volumes_of({2, 3, 2}, [&](const Vector3i&) { return columns; })));
+    const Matrix3d F = axes_of(ComponentFrame::voxels, transform.linear());
+    for (const bool is_ras : {false, true}) {
+      Lattice lattice = open_nifti(file);
+      if (is_ras) take_frame(lattice, ComponentFrame::ras);
+      LatticeReport report;
+      const TensorGrid grid = tensors_of(lattice, {}, report);
+      const Matrix3d expected = is_ras ? T : Matrix3d(F * T * F.transpose());
+      for (const Vector3i& index : {Vector3i(0, 0, 0), Vector3i(1, 2, 1)})
+        EXPECT_LT((test::voxel(grid, index)->cast<double>() - expected).norm(), 1e-5) << sign << is_ras;
+      EXPECT_EQ(report.notes.size(), is_ras ? 0u : 1u);
+    }
+  }
+}
+
 TEST(Nifti, BrainHasItsFacts) {
   const auto path = data_file("brain_dti/tensorLAS.nii.gz");
   SKIP_WITHOUT(path);

@@ -41,6 +41,7 @@ class MeshCell {
   /// Contains the cell. For a curved cell it is larger than the box of its points.
   Eigen::AlignedBox3d box() const;
   double volume() const;
+  double edge() const;  ///< Of a cube that is as large, or that is divided into such simplices or prisms.
 
   /// The least distance between opposite faces, after a stretch by `scale` along each axis: as if the cell were what it
   /// is at its centre. Of simplices and prisms it is √2 times that, so that a cube's tetrahedra are as thick as the

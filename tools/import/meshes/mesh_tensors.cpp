@@ -43,7 +43,8 @@ void for_each_array(vtkDataSet& mesh, const Visit& visit) {
     for (int i = 0; i < data.GetNumberOfArrays(); ++i) {
       vtkDataArray* array = data.GetArray(i);
       if (!array || !array->GetName()) continue;
-      if (std::string(array->GetName()) != vtkDataSetAttributes::GhostArrayName()) visit(*array, of_cells);
+      const std::string name = array->GetName();
+      if (name != vtkDataSetAttributes::GhostArrayName() && name != layer_array) visit(*array, of_cells);
     }
   }
 }
@@ -182,8 +183,9 @@ vtkSmartPointer<vtkDataSet> with_arrays(vtkDataSet& mesh, const Array& of_points
   auto result = vtkSmartPointer<vtkDataSet>::Take(mesh.NewInstance());
   result->CopyStructure(&mesh);
   for (const bool cells : {false, true}) {
-    if (vtkDataArray* ghosts = attributes_of(mesh, cells).GetArray(vtkDataSetAttributes::GhostArrayName()))
-      attributes_of(*result, cells).AddArray(ghosts);
+    for (const char* const kept : {vtkDataSetAttributes::GhostArrayName(), layer_array})
+      if (vtkDataArray* array = attributes_of(mesh, cells).GetArray(kept))
+        attributes_of(*result, cells).AddArray(array);
     if (const Array& tensors = cells ? of_cells : of_points) {
       tensors->SetName(tensor_array);
       attributes_of(*result, cells).AddArray(tensors);

@@ -41,6 +41,9 @@ vtkDataSetAttributes& attributes_of(vtkDataSet& mesh, bool of_cells);
 /// The name of the array that with_tensors makes.
 constexpr const char* tensor_array = "tensor";
 
+/// Cells may have a vtkIntArray of this name: which of several layers, of which each overlaps others, they are in.
+constexpr const char* layer_array = "tensorray:layer";
+
 /// The arrays of a mesh in words, for messages: "there are: velocity (3 components, points), ...".
 std::string list_of_arrays(vtkDataSet& mesh);
 
@@ -64,9 +67,9 @@ bool is_array_list(vtkDataSet& mesh, const std::string& names);
 /// plane of x and y has three or four (xx, yy, xy, and perhaps zz, as the last two letters of their names tell). A
 /// vector has three components; in a flat mesh across z also two. Each is a scalar array, NAME:COMPONENT of another
 /// array (by the component's name, or its number from 0 on), or a component with that name, as VTK joins scalars of
-/// ExodusII. Spaces around a name do not count. A name may occur twice. All are at points, or else all are at cells.
-/// The components of the new array have the names of the old ones, of which with_tensors finds their
-/// order; they are sorted if that order has no name (tensor_order.h).
+/// ExodusII. Names may have commas. Spaces around a name do not count. A name may occur twice. All are at points, or
+/// else all are at cells. The components of the new array have the names of the old ones, of which with_tensors finds
+/// their order; they are sorted if that order has no name (tensor_order.h).
 /// @param is_flat  The mesh is flat across z, or was before it became a slab.
 /// @throw std::invalid_argument that names the array and lists those that there are.
 ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& names, Take take = Take::tensor, bool is_flat = false);

@@ -113,6 +113,8 @@ void print_sampling(const ImportReport& report) {
                         mesh.voxel.z(), mesh.active));
   tell_made(fmt::format("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}",
                         mesh.native_peak, mesh.sampled_peak, mesh.native_median, mesh.sampled_median));
+  if (mesh.overlaid > 0)
+    tell_made(fmt::format("  {} voxels lie in several blocks, which overlap: the smallest cell counts", mesh.overlaid));
   if (mesh.non_finite > 0)
     tell_made(fmt::format("  {} {} of the mesh are not finite", mesh.non_finite, mesh.of_cells ? "cells" : "points"));
   if (mesh.sampled_peak < kept_peak * mesh.native_peak)

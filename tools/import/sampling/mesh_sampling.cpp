@@ -11,6 +11,7 @@
 #include <vtkCellData.h>
 #include <vtkDataSet.h>
 #include <vtkDoubleArray.h>
+#include <vtkIntArray.h>
 #include <vtkPointData.h>
 
 #include "tools/import/meshes/mesh_tensors.h"
@@ -96,10 +97,12 @@ TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const
   const Solid solid = solid_part(mesh);
   const SamplingLattice lattice = sampling_lattice(mesh, solid, settings);
   const double tolerance = face_tolerance * solid.bounds.diagonal().norm();
-  const MeshSource source{mesh, of_points, of_cells, solid, lattice, tolerance};
+  auto* const layers = vtkIntArray::SafeDownCast(mesh.GetCellData()->GetArray(layer_array));
+  const MeshSource source{mesh,     of_points, of_cells, solid, lattice, layers ? layers->GetPointer(0) : nullptr,
+                          tolerance};
   TensorGrid grid;
   grid.to_world = Eigen::Translation3d(lattice.origin) * Eigen::Scaling(lattice.voxel);
-  grid.blocks = mesh_blocks(source, progress);
+  grid.blocks = mesh_blocks(source, progress, report.overlaid);
   remove_empty_blocks(grid);
   report.size = lattice.size;
   report.voxel = lattice.voxel;

@@ -66,6 +66,15 @@ double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& bo
   return voxel;
 }
 
+/// Four steps for each halving of the edge. Cells of one size, which differ by rounding, become equal.
+std::vector<int> coarseness_of(const std::vector<float>& edges) {
+  const float largest = edges.empty() ? 1 : *std::max_element(edges.begin(), edges.end());
+  std::vector<int> coarseness;
+  for (const float edge : edges)
+    coarseness.push_back(edge > 0 ? static_cast<int>(std::lround(4 * std::log2(edge / largest))) : 0);
+  return coarseness;
+}
+
 void require_two(int count) {
   if (count < 2) throw std::invalid_argument(fmt::format("--resolution {}: at least 2 voxels are needed", count));
 }
@@ -78,6 +87,7 @@ Solid solid_part(vtkDataSet& mesh) {
   solid.boxes.resize(static_cast<std::size_t>(count));
   solid.thickness.resize(solid.boxes.size());
   std::vector<AlignedBox3d> hulls(solid.boxes.size());
+  std::vector<float> edges(solid.boxes.size());
   std::vector<std::atomic<bool>> used(static_cast<std::size_t>(mesh.GetNumberOfPoints()));
   MeshCell first;
   if (count > 0) first.load(mesh, 0);  // makes VTK's cached data on one thread
@@ -87,6 +97,8 @@ Solid solid_part(vtkDataSet& mesh) {
       if (!cell.load(mesh, id)) continue;
       solid.boxes[static_cast<std::size_t>(id)] = cell.box();
       solid.thickness[static_cast<std::size_t>(id)] = static_cast<float>(cell.thickness(Vector3d::Ones()));
+      if (const double edge = cell.edge(); std::isfinite(edge))
+        edges[static_cast<std::size_t>(id)] = static_cast<float>(edge);
       for (int i = 0; i < cell.points(); ++i) {
         hulls[static_cast<std::size_t>(id)].extend(cell.positions().col(i));
         used[static_cast<std::size_t>(cell.point(i))].store(true, std::memory_order_relaxed);
@@ -95,6 +107,7 @@ Solid solid_part(vtkDataSet& mesh) {
   });
   for (const AlignedBox3d& hull : hulls) solid.bounds.extend(hull);
   solid.points.assign(used.begin(), used.end());
+  solid.coarseness = coarseness_of(edges);
   if (solid.bounds.isEmpty())
     throw std::invalid_argument(
         "the mesh has no three-dimensional cells (it is flat, or points alone): a field needs tensors in a volume");

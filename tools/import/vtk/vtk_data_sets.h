@@ -43,11 +43,13 @@ bool is_same_mesh(vtkDataSet& a, vtkDataSet& b);
 
 /// Returns the only data set of `pieces`. If there are several, merges them into one unstructured grid, and merges
 /// points at equal positions, which take the values of the first piece in which they are finite. An array that a piece
-/// lacks is NaN there. Tensors whose components have different names there are sorted by them. Null if `pieces` is
-/// empty. Changes the ghost arrays of the pieces. The geometry of the pieces must have passed check_geometry.
+/// lacks is NaN there; a piece's own points go before copies of another's. Where pieces overlap, they share no points,
+/// and an array of cells, layer_array (mesh_tensors.h), says which ones do not overlap. Tensors whose components have
+/// different names there are sorted by them. Null if `pieces` is empty. Changes the ghost arrays of the pieces. The
+/// geometry of the pieces must have passed check_geometry.
 ///
 /// Ghosts of all kinds of data sets mean the same. Of an only data set hidden cells and points stay marked (refined
-/// cells count as hidden), and copies of neighbours' cells and points stay, whose values are right. Of several, hidden
+/// cells count as hidden), and copies of neighbours' cells and points stay where no other cell is. Of several, hidden
 /// cells, cells with hidden points, and copies are removed.
 /// @param merges_points  False: points at equal positions stay apart, where pieces have values of their own.
 vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces, bool merges_points = true);

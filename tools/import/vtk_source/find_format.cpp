@@ -67,6 +67,7 @@ const MeshFormat* format_of_contents(const fs::path& path, const std::string& he
   if (head.find("ADF Database") == 4) return format_with_ending(".cgns");
   if (const MeshFormat* const format = xml_format(path, head)) return format;
   if (head.find("<Xdmf") != std::string::npos) return format_with_ending(".xdmf");
+  if (ending == ".series" && starts_with(trimmed(head), "{")) return format_with_ending(".series");
   if (is_ensight(head)) return format_with_ending(".case");
   return path.filename() == "controlDict" || path.extension() == ".foam" ? format_with_ending(".foam") : nullptr;
 }
@@ -133,9 +134,11 @@ std::string way_out(const std::string& ending, const std::string& name) {
   const std::pair<std::vector<std::string>, std::string> ways[] = {
       {{".msh"},
        "is a mesh of Gmsh, which is not read; run `meshio convert " + name + " FILE.vtu` (Debian's meshio-tools)"},
-      {{".med"},
-       "is a file of MED (Salome, Code_Aster), which is not read; run `meshio convert " + name +
-           " FILE.vtk` (Debian's meshio-tools and python3-h5py)"},
+      {{".med", ".rmed", ".mmed"},
+       "is a file of MED (Salome, Code_Aster), which is not read; save it as .vtu with Salome's ParaViS (File > Save "
+       "Data), or print it in Code_Aster with fields at nodes alone (IMPR_RESU, NOM_CHAM='SIGM_NOEU') and run `meshio "
+       "convert " +
+           name + " FILE.vtk` (Debian's meshio-tools and python3-h5py), which fails on fields at Gauss points"},
       {{".frd"},
        "is a result of CalculiX, which is not read; convert it to .vtu with ccx2paraview, or in FreeCAD (export its "
        "Results)"},
@@ -161,7 +164,7 @@ const MeshFormat& checked_format(const fs::path& path) {
   if (head.empty() && promised != format_with_ending(".foam")) fail(path, "is empty; write it again");
   if (!found && promised) fail(path, "is not " + promised->text + ", as its ending says");
   if (const std::string way = way_out(ending, path.filename().string());
-      !way.empty() && (!found || ending == ".med"))  // MED is HDF5, too.
+      !way.empty() && (!found || ends_with(ending, "med")))  // MED is HDF5, too.
     fail(path, way);
   if (!found)
     fail(path,

@@ -19,6 +19,7 @@
 #include <vtkOpenFOAMReader.h>
 #include <vtkSmartPointer.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
+#include <vtkUnstructuredGrid.h>
 #include <vtkXMLGenericDataObjectReader.h>
 
 #include "base/errors.h"
@@ -28,6 +29,7 @@
 #include "tools/import/cases/ensight.h"
 #include "tools/import/cases/openfoam.h"
 #include "tools/import/hdf5/hdf5_meshes.h"
+#include "tools/import/vtk/polyhedra.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk_formats/array_names.h"
 #include "tools/import/vtk_formats/netcdf_end.h"
@@ -49,12 +51,16 @@ MeshFile open_xml(const Path& path) {
   return {1, [path](int) { return read_xml(path); }};
 }
 
+MeshFile open_unstructured(const Path& path) {
+  return {1, [path](int) { return read_vtu(path); }};
+}
+
 /// Reads piece by piece, because VTK's own reader of pieces duplicates the points on every seam.
 MeshFile open_unstructured_pieces(const Path& path) {
   return {1, [path](int) {
             auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();
             unsigned int index = 0;
-            for (const Path& piece : piece_files(path)) blocks->SetBlock(index++, read_xml(piece));
+            for (const Path& piece : piece_files(path)) blocks->SetBlock(index++, read_vtu(piece));
             return blocks;
           }};
 }
@@ -215,7 +221,7 @@ const std::vector<MeshFormat>& mesh_formats() {
       {"a VTK image", "ImageData", {".vti"}, open_xml},
       {"a VTK rectilinear grid", "RectilinearGrid", {".vtr"}, open_xml},
       {"a VTK structured grid", "StructuredGrid", {".vts"}, open_xml},
-      {"a VTK unstructured grid", "UnstructuredGrid", {".vtu"}, open_xml},
+      {"a VTK unstructured grid", "UnstructuredGrid", {".vtu"}, open_unstructured},
       {"a VTK image in pieces", "PImageData", {".pvti"}, open_xml, true},
       {"a VTK rectilinear grid in pieces", "PRectilinearGrid", {".pvtr"}, open_xml, true},
       {"a VTK structured grid in pieces", "PStructuredGrid", {".pvts"}, open_xml, true},
@@ -228,6 +234,7 @@ const std::vector<MeshFormat>& mesh_formats() {
       {"a VTKHDF file", "", {".vtkhdf", ".hdf"}, open_vtkhdf, true},
       {"a VTK multi-block file", "vtkMultiBlockDataSet", {".vtm"}},
       {"a ParaView collection", "Collection", {".pvd"}},
+      {"a series of files", "", {".series"}},
   };
   return formats;
 }

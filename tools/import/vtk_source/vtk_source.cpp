@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <new>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
 #include <vtkDataSet.h>
 #include <vtkSmartPointer.h>
 #include <vtkXMLDataElement.h>
@@ -54,10 +56,30 @@ void collect(vtkXMLDataElement& element, const Path& path, FilesByTime& steps) {
   }
 }
 
-/// The files of volumes, each once, that a collection (.vtm, .pvd) names for each step of time, in the order of times.
-/// A .vtm has one step, with all of its blocks. Surfaces (.vtp) are left out, because exporters put a body's patches
-/// beside its volume.
+/// The files of a series (.series), in the order of their times.
+std::vector<std::vector<Path>> series_steps(const Path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const auto json = nlohmann::json::parse(file, nullptr, false);
+  std::vector<std::pair<double, Path>> files;
+  try {
+    for (const auto& each : json.at("files"))
+      files.emplace_back(each.value("time", static_cast<double>(files.size())),
+                         path.parent_path() / each.at("name").get<std::string>());
+  } catch (const nlohmann::json::exception&) {
+    files.clear();
+  }
+  if (files.empty()) fail(path, "is damaged, or names no files; write it again");
+  std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<std::vector<Path>> steps;
+  for (const auto& [time, name] : files) steps.push_back({name.lexically_normal()});
+  return steps;
+}
+
+/// The files of volumes, each once, that a collection (.vtm, .pvd, .series) names for each step of time, in the order
+/// of times. A .vtm has one step, with all of its blocks. Surfaces (.vtp) are left out, because exporters put a body's
+/// patches beside its volume.
 std::vector<std::vector<Path>> collection_steps(const Path& path) {
+  if (lower_case_ending(path) == ".series") return series_steps(path);
   const auto root = vtkSmartPointer<vtkXMLDataElement>::Take(vtkXMLUtilities::ReadElementFromFile(path.c_str()));
   if (!root) fail(path, "is damaged: it is no XML; write it again");
   FilesByTime by_time;
