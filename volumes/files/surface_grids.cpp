@@ -13,10 +13,6 @@ using Eigen::Vector3d;
 
 constexpr std::size_t rows_of_block = TensorBlock::voxels / 2;
 
-openvdb::Vec3s stored_vector(const Vector3d& v) {
-  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
-}
-
 /// @param place_of_cube  Of edge 1: the voxels are in it.
 openvdb::GridBase::Ptr list_grid(const std::string& name, const std::vector<Vector3d>& rows,
                                  const Eigen::Affine3d& place_of_cube) {
@@ -28,16 +24,16 @@ openvdb::GridBase::Ptr list_grid(const std::string& name, const std::vector<Vect
   openvdb::Vec3STree::LeafNodeType* leaf = nullptr;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::size_t block = i / rows_of_block;
-    const Eigen::Vector3i at(Eigen::Matrix<std::size_t, 3, 1>(block / edge / edge, block / edge % edge, block % edge)
-                                 .cast<int>());
+    const Eigen::Vector3i at(
+        Eigen::Matrix<std::size_t, 3, 1>(block / edge / edge, block / edge % edge, block % edge).cast<int>());
     if (i % rows_of_block == 0) {
       leaf = new openvdb::Vec3STree::LeafNodeType(coord_of(TensorBlock::size * at));
       grid->tree().addLeaf(leaf);  // The tree owns it.
     }
     const Vector3d rounded = rows[i].cast<float>().cast<double>();
     const auto voxel = static_cast<openvdb::Index>(2 * (i % rows_of_block));
-    leaf->setValueOn(voxel, stored_vector(rounded));
-    leaf->setValueOn(voxel + 1, stored_vector(rows[i] - rounded));
+    leaf->setValueOn(voxel, openvdb::Vec3s(rounded.data()));
+    leaf->setValueOn(voxel + 1, openvdb::Vec3s(Vector3d(rows[i] - rounded).data()));
   }
   place(*grid, place_of_cube * Eigen::Scaling(1.0 / static_cast<double>(edge * TensorBlock::size)));
   return grid;
@@ -73,7 +69,8 @@ std::set<std::string> surface_names(const std::string& field) { return {points_n
 openvdb::GridPtrVec surface_grids(const TriangleMesh& surface, const std::string& field,
                                   const Eigen::Affine3d& to_world, const Eigen::Vector3i& first_voxel) {
   if (surface.triangles.empty()) return {};
-  const Eigen::Affine3d to_index = to_world.inverse(), cube = to_world * Eigen::Translation3d(first_voxel.cast<double>());
+  const Eigen::Affine3d to_index = to_world.inverse(),
+                        cube = to_world * Eigen::Translation3d(first_voxel.cast<double>());
   std::vector<Vector3d> points, triangles;
   for (const Vector3d& vertex : surface.vertices) points.emplace_back(to_index * vertex);
   for (const auto& t : surface.triangles) triangles.emplace_back(t[0], t[1], t[2]);

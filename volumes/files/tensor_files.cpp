@@ -162,10 +162,13 @@ void check_half_range(const std::filesystem::path& path, const TensorGrid& grid)
   });
 }
 
-/// Where another grid lies within this one. @param grid  Of tensors, or numbers.
+/// The first active voxel. @param grid  Of tensors, or numbers.
 template <class Grid>
 Eigen::Vector3i first_voxel(const Grid& grid) {
-  return grid.blocks.empty() ? Eigen::Vector3i(0, 0, 0) : grid.blocks.front().origin;
+  for (const auto& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[static_cast<std::size_t>(offset)]) return block.origin + TensorBlock::position(offset);
+  return {0, 0, 0};
 }
 
 openvdb::FloatGrid::Ptr float_grid(const ScalarGrid& grid) {
@@ -228,7 +231,8 @@ void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid,
   if (is_half) check_half_range(path, grid);
   openvdb::GridPtrVec rows;
   for (int row = 0; row < 3; ++row) rows.push_back(std::make_shared<RowGrid>(grid, row, is_half));
-  for (const auto& part : surface_grids(grid.surface, grid.name, grid.to_world, first_voxel(grid))) rows.push_back(part);
+  for (const auto& part : surface_grids(grid.surface, grid.name, grid.to_world, first_voxel(grid)))
+    rows.push_back(part);
   openvdb::MetaMap metadata;
   for (const auto& [key, value] : grid.metadata)
     if (key != length_unit_key) metadata.insertMeta(key, openvdb::StringMetadata(value));

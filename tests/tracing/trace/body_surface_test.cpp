@@ -51,6 +51,7 @@ std::vector<Body> bodies() {
   const Vector3d half(0.7, 0.6, 0.55);
   const Eigen::Affine3d turn(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()));
   const auto box = [=](const Vector3d& p) { return ((turn.inverse() * p).cwiseAbs() - half).maxCoeff(); };
+  const Vector3d on_voxels(0.55, 0.6, across / 2);  // At phase 0, its faces are those of the field's box.
   const auto tube = [](const Vector3d& p) {
     const double radius = p.head<2>().norm();
     return std::max({radius - 0.7, 0.33 - radius, std::abs(p.z()) - 0.61});
@@ -60,7 +61,9 @@ std::vector<Body> bodies() {
     half_circle.emplace_back(i % 160 == 0 ? 0 : 0.7 * std::sin(pi * i / 160), -0.7 * std::cos(pi * i / 160));
   return {{"ball", [](const Vector3d& p) { return p.norm() - 0.7; }, turned_mesh(half_circle, 320)},
           {"tube", tube, turned_mesh({{0.33, -0.61}, {0.7, -0.61}, {0.7, 0.61}, {0.33, 0.61}}, 1024)},
-          {"box", box, box_mesh({-half, half}, turn)}};
+          {"box", box, box_mesh({-half, half}, turn)},
+          {"upright box", [=](const Vector3d& p) { return (p.cwiseAbs() - on_voxels).maxCoeff(); },
+           box_mesh({-on_voxels, on_voxels}, Eigen::Affine3d::Identity())}};
 }
 
 struct BeamStart {
