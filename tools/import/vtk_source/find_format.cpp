@@ -56,6 +56,7 @@ bool is_ensight(const std::string& head) {
 
 const MeshFormat* format_of_contents(const fs::path& path, const std::string& head) {
   const std::string ending = lower_case_ending(path);
+  if (ending == ".mnc" || ending == ".mat") return nullptr;  // Which are netCDF or HDF5, too.
   if (starts_with(head, "# vtk DataFile Version")) return format_with_ending(".vtk");
   for (const char version : {'\x01', '\x02', '\x05'})
     if (starts_with(head, std::string("CDF") + version)) return format_with_ending(".exo");
@@ -129,7 +130,7 @@ void check_pieces(const fs::path& path, const MeshFormat& whole) {
 }
 
 /// For formats that others convert: how. Empty for all others.
-std::string way_out(const std::string& ending, const std::string& name) {
+std::string way_out(const std::string& name) {
   const std::pair<std::vector<std::string>, std::string> ways[] = {
       {{".msh"},
        "is a mesh of Gmsh, which is not read; run `meshio convert " + name + " FILE.vtu` (Debian's meshio-tools)"},
@@ -144,9 +145,41 @@ std::string way_out(const std::string& ending, const std::string& name) {
            "\")[NAME])"},
       {{".dat", ".plt", ".tec", ".szplt"},
        "may be a file of Tecplot, which is not read; open it in ParaView (File > Open, Tecplot reader) and save it as "
-       ".vtu, or .vtm if it has several blocks"}};
+       ".vtu, or .vtm if it has several blocks"},
+      {{".odb"},
+       "is a result of Abaqus, which only Abaqus itself reads; make .vtu of it with odb2vtk in Abaqus's Python"},
+      {{".rst", ".rth", ".rfl"},
+       "is a result of Ansys, which is not read; run pip install ansys-mapdl-reader, and in Python "
+       "ansys.mapdl.reader.read_binary(\"" +
+           name + "\").save_as_vtk(\"FILE.vtu\")"},
+      {{".op2", ".f06", ".xdb", ".d3plot", ".unv", ".fil", ".res"},
+       "is a result of a solver, which is not read; open it in ParaView or in the solver's own postprocessor, and save "
+       "it as .vtu, EnSight (.case), CGNS or ExodusII"},
+      {{".cas", ".cas.h5", ".dat.h5", ".sim", ".ccm", ".ccmp"},
+       "is a case of Fluent or STAR-CCM+, which is not read; export it there as EnSight Gold (.case) or CGNS"},
+      {{".mgz", ".mgh"}, "is an image of FreeSurfer, which is not read; run mri_convert " + name + " FILE.nii.gz"},
+      {{".mnc"}, "is an image of MINC, which is not read; run mnc2nii " + name + " FILE.nii"},
+      {{".dcm", ".ima"},
+       "is DICOM, which is not read; run dcm2niix on its folder, and fit the tensors of what it makes"},
+      {{".fib.gz", ".fib", ".fz", ".src.gz", ".sz"},
+       "is a file of DSI Studio, with fibre directions or signals and no tensors; fit these to the measured images "
+       "with "
+       "dtifit --save_tensor (FSL) or dwi2tensor (MRtrix)"},
+      {{".tck", ".trk", ".trx"},
+       "holds fibres, which have no tensors; import the image of tensors that they were made of"},
+      {{".stl", ".ply", ".obj", ".off", ".gltf", ".glb"},
+       "is a surface, which has no tensors in it; import the volume's grid, and name the surface in the scene"},
+      {{".mat"},
+       "is a file of MATLAB; save the array as .npy: numpy.save(\"FILE.npy\", scipy.io.loadmat(\"" + name +
+           "\")[NAME])"},
+      {{".csv", ".txt", ".xlsx"},
+       "is a table, which says nothing of cells; save what it was made of as .vtu, or a regular grid's numbers as "
+       ".npy"},
+      {{".vdb"}, "is an OpenVDB file, which needs no import: name it in the scene (field.file)"}};
   for (const auto& [endings, way] : ways)
-    if (std::count(endings.begin(), endings.end(), ending) > 0) return way;
+    if (std::any_of(endings.begin(), endings.end(),
+                    [&](const std::string& one) { return ends_with(lower_case(name), one); }))
+      return way;
   return {};
 }
 
@@ -160,7 +193,7 @@ const MeshFormat& checked_format(const fs::path& path) {
   const MeshFormat* const found = is_folder ? promised : format_of_contents(path, head);
   if (head.empty() && promised != format_with_ending(".foam")) fail(path, "is empty; write it again");
   if (!found && promised) fail(path, "is not " + promised->text + ", as its ending says");
-  if (const std::string way = way_out(ending, path.filename().string());
+  if (const std::string way = way_out(path.filename().string());
       !way.empty() && (!found || ending == ".med"))  // MED is HDF5, too.
     fail(path, way);
   if (!found)
