@@ -38,7 +38,7 @@ endif()
 
 if(TENSORRAY_IMPORT)
   find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
-               IOCGNSReader IOCore IOEnSight IOExodus IOGeometry IOLegacy IOParallel IOXML cgns exodusII hdf5 netcdf)
+               IOCGNSReader IOCore IOEnSight IOExodus IOGeometry IOLegacy IOParallel IOXML cgns exodusII hdf5)
   find_package(LibXml2 REQUIRED)
   find_package(ZLIB REQUIRED)
 

@@ -240,30 +240,6 @@ Lattice placed(Lattice lattice, const ImportSettings& settings) {
   return lattice;
 }
 
-/// Of a file with steps of time, whose last one may lack the array where its writer was stopped.
-TensorGrid import_step(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
-  const std::filesystem::path& file = settings.files.front();
-  const auto import_at = [&](std::optional<int> step) {
-    return import_data_set(read_vtk_source(file, step, &report.notes), settings, progress, report);
-  };
-  try {
-    return import_at(settings.step);
-  } catch (const std::invalid_argument& error) {
-    const int steps = settings.step ? 1 : time_steps(file);
-    if (steps < 2 || std::string(error.what()).find("no array") == std::string::npos) throw;
-    const ImportReport before = report;
-    try {
-      TensorGrid grid = import_at(steps - 2);
-      report.notes.push_back(
-          fmt::format("step {} of {} is taken, as the last one has no such array", steps - 1, steps));
-      return grid;
-    } catch (const std::exception&) {
-      report = before;
-    }
-    throw;
-  }
-}
-
 TensorGrid import_any(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
   const std::filesystem::path& file = settings.files.front();
   const OpenLattice open = lattice_reader(file);
@@ -273,7 +249,10 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
     throw std::invalid_argument("has one step of time; leave --steps out");
   if (settings.files.size() == 2)
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
-  if (!open) return import_step(settings, progress, report);
+  if (!open) {
+    const auto data = read_vtk_source(file, settings.step, &report.notes);
+    return import_data_set(data, settings, progress, report);
+  }
   if (open == open_npy) return import_lattice(placed(open(file), settings), settings, report);
   if (wants_sampling(settings))
     throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
@@ -288,16 +267,6 @@ std::string about(const std::filesystem::path& file, const std::string& error, c
   if (message.find(file.string()) == std::string::npos) message = file.string() + ": " + message;
   for (const std::string& note : report.notes) message += " (" + escaped(note) + ")";
   return message;
-}
-
-/// Why there is no tensor at any voxel.
-std::string no_tensors(const std::optional<LatticeReport>& lattice) {
-  if (!lattice || lattice->non_finite == 0 || lattice->non_finite + lattice->background < lattice->voxels)
-    return "all voxels are background or not finite";
-  return fmt::format(
-      "its numbers are NaN or infinite at {} of {} voxels, and zero (background) at the others; check "
-      "what wrote it",
-      lattice->non_finite, lattice->voxels);
 }
 
 /// Pieces of one mesh are named by any of them.
@@ -362,7 +331,11 @@ TensorGrid import_tensors(const ImportSettings& given, const Progress& progress,
   }
   if (grid.blocks.empty() && settings.sampling.bounds)
     throw std::invalid_argument(file.string() + ": --bounds: no voxel is inside that has a tensor");
-  if (grid.blocks.empty()) throw std::runtime_error(file.string() + ": " + no_tensors(report.lattice));
+  if (grid.blocks.empty())
+    fail(file, report.lattice && report.lattice->non_finite > 0
+                   ? fmt::format("has no tensor: {} of its {} voxels are NaN or infinite, the others zero (background)",
+                                 report.lattice->non_finite, report.lattice->voxels)
+                   : "all voxels are background or not finite");
   require_place(file, grid);
   warn_of_same(grid, report);
   grid.name = tensor_name(grid.name, settings.take);

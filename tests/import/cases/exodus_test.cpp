@@ -119,6 +119,15 @@ Imported import(const std::vector<Path>& files, const std::string& array, Take t
   return result;
 }
 
+std::string refusal(const Path& path, const char* array, Take take) {
+  try {
+    import({path}, array, take);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return {};
+}
+
 const char* const stress_list = "s_xx,s_yy,s_zz,s_xy,s_yz,s_xz";
 
 /// Expects v and the stress of a step, from 1 on. @return the notes.
@@ -148,7 +157,7 @@ TEST(Exodus, TheLastCompleteStepIsTaken) {
     std::function<void(int mode)> spoil;
     const char* words;
   };
-  const Row table[] = {{"nothing", 4, [](int) {}, ""},
+  const Row table[] = {{"nothing", 4, [](int) {}, "; --steps chooses another one"},
                        {"its time", 3, [&](int) { fill(path, "time_whole", 4); }, "its time was not written"},
                        {"a time of zero", 3, [&](int) { fill(path, "time_whole", 4, 0); }, "its time"},
                        {"nodes", 3, [&](int mode) { fill(path, dataset(mode, 2), 4); }, "was not written"},
@@ -164,9 +173,8 @@ TEST(Exodus, TheLastCompleteStepIsTaken) {
       write_bar(path, 4, mode);
       row.spoil(mode);
       const std::string notes = expect_step(path, row.last);
-      EXPECT_EQ(notes.empty(), row.last == 4) << notes;
-      if (row.last == 4) continue;
       EXPECT_THAT(notes, HasSubstr("step " + std::to_string(row.last) + " of 4 is taken")) << row.name;
+      if (row.last == 4) continue;
       EXPECT_THAT(notes, HasSubstr(row.words)) << row.name;
       const std::string asked = error_of([&] { import({path}, "v_", Take::gradient, 3); });
       EXPECT_THAT(asked, AllOf(HasSubstr("a.e: step 4 of 4 is not complete: "), HasSubstr("--steps"))) << row.name;
@@ -181,25 +189,14 @@ TEST(Exodus, FillValuesAreHoles) {
   fill(folder / "a.e", "time_whole", 1);
   EXPECT_EQ(expect_step(folder / "a.e", 1), "");
   fill(folder / "a.e", "vals_nod_var1", 1);
-  EXPECT_THROW(import({folder / "a.e"}, "v_", Take::gradient), std::invalid_argument);
+  EXPECT_THAT(refusal(folder / "a.e", "v_", Take::gradient), HasSubstr("have NaN or infinite tensors"));
   EXPECT_GT(import({folder / "a.e"}, stress_list, Take::tensor).voxels, 0u);
-  for (const int i : {2, 3}) fill(folder / "a.e", "vals_nod_var" + std::to_string(i), 1);
-  for (int i = 1; i <= 6; ++i) fill(folder / "a.e", "vals_elem_var" + std::to_string(i) + "eb1", 1);
-  EXPECT_THAT(error_of([&] { import({folder / "a.e"}, "v_", Take::gradient); }),
-              HasSubstr("step 1 of 1 is not complete: every variable was not written"));
 }
 
 TEST(Exodus, VariablesThatAreNotThereAreLeftOut) {
   const TemporaryFolder folder;
   const Path path = folder / "a.e";
-  const auto error = [&](const char* array, Take take) {
-    try {
-      import({path}, array, take);
-    } catch (const std::invalid_argument& thrown) {
-      return std::string(thrown.what());
-    }
-    return std::string();
-  };
+  const auto error = [&](const char* array, Take take) { return refusal(path, array, take); };
   for (const int mode : modes) {
     write_bar(path, 2, mode);
     set_aside(path, dataset(mode, 2));
@@ -254,10 +251,11 @@ TEST(Exodus, PiecesOfNemesisAreOneMesh) {
   write_bar(second, 2, EX_LARGE_MODEL, 2, 3);
   EXPECT_THAT(expect_step(first, 2), HasSubstr("step 2 of 3 is taken"));
   std::filesystem::remove(second);
-  EXPECT_THAT(error_of([&] { import({first}, "v_", Take::gradient); }), HasSubstr("of which out.e.2.1 is missing"));
+  EXPECT_THAT(error_of([&] { import({first}, "v_", Take::gradient); }),
+              HasSubstr("of which are missing: out.e.2.1; copy"));
   write_bar(folder / "out.e.12.07", 1);
   EXPECT_THAT(error_of([&] { import({folder / "out.e.12.07"}, "v_", Take::gradient); }),
-              HasSubstr("of which out.e.12.00, out.e.12.01"));
+              HasSubstr("of which are missing: out.e.12.00 out.e.12.01"));
   write_bar(folder / "run.2.5.e", 1);  // No piece.
   EXPECT_EQ(import({folder / "run.2.5.e"}, "v_", Take::gradient).cells, 2u);
 }

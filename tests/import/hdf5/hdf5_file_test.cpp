@@ -90,7 +90,7 @@ TEST(Hdf5File, NumbersThatAreElsewhereOrNowhere) {
       {"/e_cut", external("cut.bin"), "cut.bin, which is missing or cut off"},
       {"/chunks", chunked, "/chunks was announced, and not written"}};
   for (const Row& row : table) {
-    if (row.set) ASSERT_TRUE(make(path, row.name, row.set)) << row.name;
+    EXPECT_TRUE(!row.set || make(path, row.name, row.set)) << row.name;
     const std::string error = error_of([&] {
       const auto read = Hdf5File(path).read(row.name);
       for (vtkIdType i = 0; i < read->GetNumberOfTuples(); ++i)

@@ -1,7 +1,6 @@
 #include "tools/import/cases/exodus.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -19,7 +18,6 @@
 #include <vtkMultiBlockDataSet.h>
 #include <vtkSmartPointer.h>
 #include <vtk_exodusII.h>
-#include <vtk_netcdf.h>
 
 #include "base/errors.h"
 #include "base/text/text.h"
@@ -37,8 +35,8 @@ bool is_fill(double value) { return value == NC_FILL_DOUBLE; }
 /// Numbers of a variable at each step: of all nodes, or of the elements of a block.
 struct VariablePart {
   ex_entity_type kind;
-  int variable, block;  ///< From 1 on.
-  ex_entity_id id;      ///< Of the block.
+  int variable;  ///< From 1 on.
+  ex_entity_id block;
   std::size_t count;
   std::string name;
 };
@@ -48,32 +46,27 @@ struct Piece {
   Path path;
   std::shared_ptr<const int> file;  ///< Of the library of ExodusII, and of netCDF's.
   vtkSmartPointer<vtkExodusIIReader> reader;
-  std::vector<VariablePart> numbers;  ///< That are in the file.
+  std::vector<VariablePart> parts;  ///< That are in the file.
   std::set<std::string> missing;
 };
 
-/// Whether the file has a variable in the shape (step, node) or (step, variable, node).
-bool is_there(int file, const VariablePart& numbers) {
-  int size = 0, id = 0, rank = 0;
-  std::array<int, NC_MAX_VAR_DIMS> dimensions{};
-  std::size_t extent = 0;
-  const bool is_large = nc_get_att_int(file, NC_GLOBAL, "file_size", &size) == NC_NOERR && size != 0;
-  const bool is_shared = numbers.kind == EX_NODAL && !is_large;  // By all variables.
-  const std::string name = numbers.kind != EX_NODAL
-                               ? fmt::format("vals_elem_var{}eb{}", numbers.variable, numbers.block)
-                               : "vals_nod_var" + (is_shared ? "" : std::to_string(numbers.variable));
-  return nc_inq_varid(file, name.c_str(), &id) == NC_NOERR &&
-         nc_inq_var(file, id, nullptr, nullptr, &rank, dimensions.data(), nullptr) == NC_NOERR &&
-         rank == (is_shared ? 3 : 2) &&
-         nc_inq_dimlen(file, dimensions[static_cast<std::size_t>(rank - 1)], &extent) == NC_NOERR &&
-         extent == numbers.count;
+/// @param step  From 0 on. @return whether so many numbers are there.
+bool read_numbers(int file, const VariablePart& part, int step, std::vector<double>& values) {
+  return ex_get_var(file, step + 1, part.kind, part.variable, part.block, static_cast<std::int64_t>(values.size()),
+                    values.data()) >= 0;
+}
+
+/// Whether the file has a variable, and as many numbers as there are nodes or elements.
+bool is_there(int file, const VariablePart& part) {
+  std::vector<double> values(part.count), more(part.count + 1);
+  return read_numbers(file, part, 0, values) && !read_numbers(file, part, 0, more);
 }
 
 /// Those that a file announces.
-std::vector<VariablePart> announced_numbers(int file, const ex_init_params& sizes, const Path& path) {
+std::vector<VariablePart> announced_parts(int file, const ex_init_params& sizes, const Path& path) {
   std::vector<VariablePart> all;
   for (const std::string& name : exodus_variables(path, false))
-    all.push_back({EX_NODAL, static_cast<int>(all.size()) + 1, 0, 1, static_cast<std::size_t>(sizes.num_nodes), name});
+    all.push_back({EX_NODAL, static_cast<int>(all.size()) + 1, 1, static_cast<std::size_t>(sizes.num_nodes), name});
   const std::vector<std::string> names = exodus_variables(path, true);
   const auto blocks = static_cast<std::size_t>(sizes.num_elem_blk);
   std::vector<int> ids(blocks), table(blocks * names.size());
@@ -86,35 +79,31 @@ std::vector<VariablePart> announced_numbers(int file, const ex_init_params& size
     facts.type = EX_ELEM_BLOCK;
     facts.id = ids[block];
     if (table[i] == 0 || ex_get_block_param(file, &facts) < 0 || facts.num_entry == 0) continue;
-    all.push_back({EX_ELEM_BLOCK, static_cast<int>(variable) + 1, static_cast<int>(block) + 1, facts.id,
-                   static_cast<std::size_t>(facts.num_entry), names[variable]});
+    all.push_back({EX_ELEM_BLOCK, static_cast<int>(variable) + 1, facts.id, static_cast<std::size_t>(facts.num_entry),
+                   names[variable]});
   }
   return all;
 }
 
-std::size_t holes_in(int file, const VariablePart& numbers, int step) {
-  std::vector<double> values(numbers.count);
-  if (ex_get_var(file, step + 1, numbers.kind, numbers.variable, numbers.id, static_cast<std::int64_t>(numbers.count),
-                 values.data()) < 0)
-    return numbers.count;
+std::size_t holes_in(int file, const VariablePart& part, int step) {
+  std::vector<double> values(part.count, NC_FILL_DOUBLE);
+  read_numbers(file, part, step, values);
   return static_cast<std::size_t>(std::count_if(values.begin(), values.end(), is_fill));
 }
 
-/// What was announced for a step, and not written; empty if there is nothing.
+/// What was announced for a step after the first, and not written; empty if there is nothing.
 std::string unwritten(const Piece& piece, int step) {
   const int file = *piece.file;
   double time = 0, before = 0;
-  if (step > 0 && ex_get_time(file, step, &before) >= 0 && ex_get_time(file, step + 1, &time) >= 0 &&
+  if (ex_get_time(file, step, &before) >= 0 && ex_get_time(file, step + 1, &time) >= 0 &&
       (is_fill(time) || !std::isfinite(time) || (time == 0 && before > 0)))
     return "its time";
-  bool has_values = piece.numbers.empty();
-  for (const VariablePart& numbers : piece.numbers) {
-    const std::size_t holes = holes_in(file, numbers, step);
-    if (step > 0 && holes > 0 && holes > holes_in(file, numbers, 0) && holes > holes_in(file, numbers, step - 1))
-      return "\"" + numbers.name + "\"";
-    has_values = has_values || holes < numbers.count;
+  for (const VariablePart& part : piece.parts) {
+    const std::size_t holes = holes_in(file, part, step);
+    if (holes > 0 && holes > holes_in(file, part, 0) && holes > holes_in(file, part, step - 1))
+      return "\"" + part.name + "\"";
   }
-  return step > 0 || has_values ? "" : "every variable";
+  return {};
 }
 
 /// Requests all variables that are there, in all blocks.
@@ -147,11 +136,10 @@ Piece open_piece(const Path& path) {
                   }};
   if (file < 0 || ex_get_init_ext(file, &sizes) < 0)
     fail(path, "is damaged, or no ExodusII file but netCDF or HDF5 of another kind");
-  for (const VariablePart& numbers : announced_numbers(file, sizes, path)) {
-    if (is_there(file, numbers))
-      piece.numbers.push_back(numbers);
-    else
-      piece.missing.insert(numbers.name);
+  const bool has_steps = ex_inquire_int(file, EX_INQ_TIME) > 0;
+  for (const VariablePart& part : announced_parts(file, sizes, path)) {
+    const bool is_good = !has_steps || is_there(file, part);
+    is_good ? piece.parts.push_back(part) : void(piece.missing.insert(part.name));
   }
   piece.reader->SetFileName(path.c_str());
   piece.reader->ApplyDisplacementsOff();
@@ -174,10 +162,10 @@ void hide_fill_values(vtkDataSet& block) {
 /// @param steps  Of the file, or of the piece that has most.
 vtkSmartPointer<vtkDataObject> read_piece(const Piece& piece, int step, int steps) {
   const int own_steps = piece.reader->GetNumberOfTimeSteps();
-  const std::string lack = own_steps == 0 ? "" : step >= own_steps ? "this piece" : unwritten(piece, step);
+  const std::string lack = step == 0 ? "" : step >= own_steps ? "this piece" : unwritten(piece, step);
   if (!lack.empty())
-    fail(piece.path, fmt::format("step {} of {} is not complete: {} was not written; {}", step + 1, steps, lack,
-                                 step > 0 ? "--steps chooses another one" : "write it again"));
+    fail(piece.path, fmt::format("step {} of {} is not complete: {} was not written; --steps chooses another one",
+                                 step + 1, steps, lack));
   if (own_steps > 0) piece.reader->SetTimeStep(step);
   piece.reader->Update();
   for (vtkDataSet* const block : data_sets_in(piece.reader->GetOutputDataObject(0))) {
@@ -188,13 +176,12 @@ vtkSmartPointer<vtkDataObject> read_piece(const Piece& piece, int step, int step
 }
 
 void require_pieces(const Path& given, const std::vector<Path>& paths) {
-  std::vector<std::string> missing;
+  std::string missing;
   for (const Path& path : paths)
-    if (!std::filesystem::is_regular_file(path)) missing.push_back(escaped(path.filename().string()));
+    if (!std::filesystem::is_regular_file(path)) missing += " " + escaped(path.filename().string());
   if (!missing.empty())
-    fail(given, fmt::format("is one of {} pieces of a mesh, of which {} {} missing; copy {} there too", paths.size(),
-                            fmt::join(missing, ", "), missing.size() == 1 ? "is" : "are",
-                            missing.size() == 1 ? "it" : "them"));
+    fail(given, fmt::format("is one of {} pieces of a mesh, of which are missing:{}; copy them there too", paths.size(),
+                            missing));
 }
 
 }  // namespace

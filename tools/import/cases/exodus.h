@@ -12,8 +12,8 @@ namespace tensorray {
 
 /// The undisplaced mesh with all variables; of a piece of Nemesis, those of all pieces. By default VTK moves the points
 /// by any array that looks like a displacement. Variables that are not in the file, or not in the shape that it
-/// announces, are left out, which the notes say. Fill values become NaN. A step is an error if its time was not
-/// written, or if a variable has more fill values there than at the first step and at the one before.
+/// announces, are left out, which the notes say. Fill values become NaN. A step after the first is an error if its
+/// time was not written, or if a variable has more fill values there than at the first step and at the one before.
 /// @throw std::runtime_error, one line that names the file and the fix.
 MeshFile open_exodus(const std::filesystem::path& path);
 

@@ -64,29 +64,20 @@ bool is_only_fill(hid_t data, hid_t memory_type, vtkDataArray& array) {
   return true;
 }
 
-/// Whether anything was written of a part: any of its chunks, if the dataset has some.
+/// Whether a part was written: its first chunk, if the dataset is in chunks.
 bool is_written(hid_t data, const HyperSlab& part) {
   H5D_space_status_t status = H5D_SPACE_STATUS_ALLOCATED;
   H5Dget_space_status(data, &status);
   if (status != H5D_SPACE_STATUS_PART_ALLOCATED) return status == H5D_SPACE_STATUS_ALLOCATED;
   const Id creation(H5Dget_create_plist(data), H5Pclose);
   const std::size_t rank = part.start.size();
-  std::vector<hsize_t> chunk(rank), first(rank), end(rank);
-  if (H5Pget_chunk(creation, static_cast<int>(rank), chunk.data()) != static_cast<int>(rank)) return true;
-  for (std::size_t i = 0; i < rank; ++i) {
-    first[i] = part.start[i] / chunk[i] * chunk[i];
-    end[i] = part.start[i] + (part.count[i] - 1) * part.stride[i];
-  }
-  for (std::vector<hsize_t> at = first;;) {
-    unsigned filters = 0;
-    haddr_t address = HADDR_UNDEF;
-    hsize_t size = 0;
-    if (H5Dget_chunk_info_by_coord(data, at.data(), &filters, &address, &size) < 0 || address != HADDR_UNDEF)
-      return true;
-    std::size_t axis = rank;
-    while (axis-- > 0 && (at[axis] += chunk[axis]) > end[axis]) at[axis] = first[axis];
-    if (axis >= rank) return false;
-  }
+  std::vector<hsize_t> chunk(rank, 1), corner(rank);
+  H5Pget_chunk(creation, static_cast<int>(rank), chunk.data());
+  for (std::size_t i = 0; i < rank; ++i) corner[i] = part.start[i] / chunk[i] * chunk[i];
+  unsigned filters = 0;
+  haddr_t address = HADDR_UNDEF;
+  hsize_t size = 0;
+  return H5Dget_chunk_info_by_coord(data, corner.data(), &filters, &address, &size) < 0 || address != HADDR_UNDEF;
 }
 
 }  // namespace

@@ -146,35 +146,24 @@ std::string way_out(const std::string& name) {
       {{".dat", ".plt", ".tec", ".szplt"},
        "may be a file of Tecplot, which is not read; open it in ParaView (File > Open, Tecplot reader) and save it as "
        ".vtu, or .vtm if it has several blocks"},
-      {{".odb"},
-       "is a result of Abaqus, which only Abaqus itself reads; make .vtu of it with odb2vtk in Abaqus's Python"},
-      {{".rst", ".rth", ".rfl"},
-       "is a result of Ansys, which is not read; run pip install ansys-mapdl-reader, and in Python "
+      {{".odb"}, "is a result of Abaqus, which only Abaqus reads; make .vtu of it with odb2vtk in Abaqus's own Python"},
+      {{".rst", ".rth"},
+       "is a result of Ansys, which is not read; pip install ansys-mapdl-reader, and then in Python "
        "ansys.mapdl.reader.read_binary(\"" +
            name + "\").save_as_vtk(\"FILE.vtu\")"},
-      {{".op2", ".f06", ".xdb", ".d3plot", ".unv", ".fil", ".res"},
-       "is a result of a solver, which is not read; open it in ParaView or in the solver's own postprocessor, and save "
-       "it as .vtu, EnSight (.case), CGNS or ExodusII"},
-      {{".cas", ".cas.h5", ".dat.h5", ".sim", ".ccm", ".ccmp"},
-       "is a case of Fluent or STAR-CCM+, which is not read; export it there as EnSight Gold (.case) or CGNS"},
+      {{".cas", ".cas.h5", ".dat.h5", ".sim", ".ccm", ".op2", ".d3plot", ".unv", ".res"},
+       "is of a solver's own format, which is not read; save it in the solver, its postprocessor or ParaView as "
+       "EnSight "
+       "Gold (.case), CGNS or .vtu"},
       {{".mgz", ".mgh"}, "is an image of FreeSurfer, which is not read; run mri_convert " + name + " FILE.nii.gz"},
       {{".mnc"}, "is an image of MINC, which is not read; run mnc2nii " + name + " FILE.nii"},
-      {{".dcm", ".ima"},
-       "is DICOM, which is not read; run dcm2niix on its folder, and fit the tensors of what it makes"},
-      {{".fib.gz", ".fib", ".fz", ".src.gz", ".sz"},
-       "is a file of DSI Studio, with fibre directions or signals and no tensors; fit these to the measured images "
-       "with "
-       "dtifit --save_tensor (FSL) or dwi2tensor (MRtrix)"},
-      {{".tck", ".trk", ".trx"},
-       "holds fibres, which have no tensors; import the image of tensors that they were made of"},
-      {{".stl", ".ply", ".obj", ".off", ".gltf", ".glb"},
-       "is a surface, which has no tensors in it; import the volume's grid, and name the surface in the scene"},
+      {{".fib.gz", ".fib", ".fz", ".src.gz", ".sz", ".dcm", ".tck", ".trk"},
+       "holds signals or fibres, and no tensors; fit these to the measured images: dtifit --save_tensor (FSL) or "
+       "dwi2tensor (MRtrix)"},
+      {{".stl", ".ply", ".obj"}, "is a surface, which has no tensors in it; import the grid of the volume"},
       {{".mat"},
-       "is a file of MATLAB; save the array as .npy: numpy.save(\"FILE.npy\", scipy.io.loadmat(\"" + name +
+       "is a file of MATLAB; save its array as .npy: numpy.save(\"FILE.npy\", scipy.io.loadmat(\"" + name +
            "\")[NAME])"},
-      {{".csv", ".txt", ".xlsx"},
-       "is a table, which says nothing of cells; save what it was made of as .vtu, or a regular grid's numbers as "
-       ".npy"},
       {{".vdb"}, "is an OpenVDB file, which needs no import: name it in the scene (field.file)"}};
   for (const auto& [endings, way] : ways)
     if (std::any_of(endings.begin(), endings.end(),

@@ -95,9 +95,10 @@ DataSets read_step(const Path& path, std::size_t steps, std::optional<int> step,
     try {
       DataSets sets = read(at);
       reading.messages.throw_error(path);
-      if (at < last)
+      if (steps > 1 && !step)
         reading.notes.push_back(
-            fmt::format("step {} of {} is taken, as those after it are not complete: {}", at + 1, steps, first_error));
+            fmt::format("step {} of {} is taken", at + 1, steps) +
+            (at < last ? ", as those after it are not complete: " + first_error : "; --steps chooses another one"));
       return sets;
     } catch (const std::runtime_error& error) {
       if (first_error.empty()) first_error = error.what();
