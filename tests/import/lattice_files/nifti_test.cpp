@@ -177,7 +177,7 @@ TEST(Nifti, GuessesAreSaidAndEigenvectorsAreRefused) {
                                     volumes_of({2, 2, 2}, [&](const Vector3i&) { return components; }));
     const test::TemporaryFile file("guess.nii", file_bytes);
     LatticeReport report;
-    tensors_of(open_nifti(file), TensorOrder::full, report);
+    tensors_of(open_nifti(file), std::nullopt, report);
     return report.notes.empty() ? "" : report.notes[0];
   };
   EXPECT_NE(note_of(std::vector<float>(9, 1)).find("taken as those of the scanner (RAS); --frame"), std::string::npos);
