@@ -130,7 +130,7 @@ void check_pieces(const fs::path& path, const MeshFormat& whole) {
 }
 
 /// For formats that others convert: how. Empty for all others.
-std::string way_out(const std::string& name) {
+std::string way_out(const std::string& ending, const std::string& name) {
   const std::pair<std::vector<std::string>, std::string> ways[] = {
       {{".msh"},
        "is a mesh of Gmsh, which is not read; run `meshio convert " + name + " FILE.vtu` (Debian's meshio-tools)"},
@@ -167,7 +167,7 @@ std::string way_out(const std::string& name) {
       {{".vdb"}, "is an OpenVDB file, which needs no import: name it in the scene (field.file)"}};
   for (const auto& [endings, way] : ways)
     if (std::any_of(endings.begin(), endings.end(),
-                    [&](const std::string& one) { return ends_with(lower_case(name), one); }))
+                    [&](const std::string& one) { return ending == one || ends_with(lower_case(name), one); }))
       return way;
   return {};
 }
@@ -182,7 +182,7 @@ const MeshFormat& checked_format(const fs::path& path) {
   const MeshFormat* const found = is_folder ? promised : format_of_contents(path, head);
   if (head.empty() && promised != format_with_ending(".foam")) fail(path, "is empty; write it again");
   if (!found && promised) fail(path, "is not " + promised->text + ", as its ending says");
-  if (const std::string way = way_out(path.filename().string());
+  if (const std::string way = way_out(ending, path.filename().string());
       !way.empty() && (!found || ending == ".med"))  // MED is HDF5, too.
     fail(path, way);
   if (!found)
