@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
 #include <vtkDataSet.h>
 #include <vtkSmartPointer.h>
 #include <vtkXMLDataElement.h>
@@ -97,7 +96,7 @@ DataSets read_step(const Path& path, std::size_t steps, std::optional<int> step,
       reading.messages.throw_error(path);
       if (steps > 1 && !step)
         reading.notes.push_back(
-            fmt::format("step {} of {} is taken", at + 1, steps) +
+            "step " + std::to_string(at + 1) + " of " + std::to_string(steps) + " is taken" +
             (at < last ? ", as those after it are not complete: " + first_error : "; --steps chooses another one"));
       return sets;
     } catch (const std::runtime_error& error) {
