@@ -17,7 +17,7 @@
 namespace tensorray {
 
 struct ImportSettings {
-  /// One file. For PLOT3D two: the grid file and the q file.
+  /// One file. For PLOT3D two: the grid file and the q file. Of Nemesis, any number of pieces of one mesh.
   std::vector<std::filesystem::path> files;
   std::string array;  ///< Its name, or a list of its components (mesh_tensors.h); empty: the only suitable one.
   Take take = Take::tensor;
@@ -38,7 +38,9 @@ struct ImportReport {
   std::optional<LatticeReport> lattice;
   std::optional<SamplingReport> mesh;
   std::size_t mesh_cells = 0, boundary_triangles = 0;
-  double thickness = 0;  ///< Of the slab that a flat mesh has become; 0: it was none.
+  double thickness = 0;               ///< Of the slab that a flat mesh has become; 0: it was none.
+  std::vector<std::string> notes;     ///< Of the mesh: guesses that were made, and what was left out, for the user.
+  std::vector<std::string> warnings;  ///< Of all formats: tensors that are hardly meant.
 };
 
 /// Reads voxels as they are, and samples meshes. The grid gets the array's name, and its source as metadata. VTK's

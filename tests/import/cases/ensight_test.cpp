@@ -146,7 +146,7 @@ TEST(EnSight, DescriptionsAnnounceNothing) {
 
 TEST(EnSight, WhatIsCutOffOrMissingIsNamed) {
   const TemporaryFolder folder;
-  const auto error = [&] { return read_error(folder / "a.case"); };
+  const auto error = [&] { return read_error(folder / "a.case", 1); };
   write_case(folder);
   const std::string sound = bytes_of(folder / "a.case");
   const auto damage = [&](const std::string& from, const std::string& to) {

@@ -195,6 +195,21 @@ TEST(Nifti, FilesWithoutAnOrientationAreTakenAsFslTakesAnalyze) {
                     test::voxel(grid, {1, 0, 0}));
 }
 
+/// Of nine components and of vectors, nothing tells the axes; no tensor can be made of eigenvectors.
+TEST(Nifti, GuessesAreSaidAndEigenvectorsAreRefused) {
+  const auto note_of = [](const std::vector<float>& components) {
+    const auto file_bytes = file_of(header_of({2, 2, 2}, static_cast<int>(components.size()), Affine3d::Identity()),
+                                    volumes_of({2, 2, 2}, [&](const Vector3i&) { return components; }));
+    const test::TemporaryFile file("guess.nii", file_bytes);
+    LatticeReport report;
+    tensors_of(open_nifti(file), std::nullopt, report);
+    return report.notes.empty() ? "" : report.notes[0];
+  };
+  EXPECT_NE(note_of(std::vector<float>(9, 1)).find("taken as those of the scanner (RAS); --frame"), std::string::npos);
+  test::expect_error([&] { note_of({0.6f, 0, -0.8f}); }, {"vectors of length 1", "dti_V1", "--save_tensor"});
+  test::expect_error([&] { note_of({0.6f, 0, -0.7f}); }, {"derive a tensor (--gradient-of)"});
+}
+
 TEST(Nifti, SlopeAndInterceptAreApplied) {
   nifti_1_header header = header_of({1, 1, 1}, 6, Affine3d::Identity());
   header.scl_slope = 0.5;

@@ -181,6 +181,9 @@ Lattice open_nifti(const std::filesystem::path& given) {
     lattice.notes.push_back(
         "states no orientation (the codes of sform and qform are 0): its first axis is taken to run from right to "
         "left, as FSL does; set the sform if it does not");
+  if (lattice.components != 6)  // Of six, --order tells the axes.
+    lattice.frame_note =
+        "does not say the axes of its components: taken as those of the scanner (RAS); --frame says otherwise";
   if (image->intent_code == NIFTI_INTENT_SYMMATRIX && lattice.components == 6)
     lattice.order = TensorOrder::lower_triangle;
   if (lattice.order)

@@ -238,6 +238,7 @@ ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take, C
     for (ArrayChoice& choice : choices) {
       if (choice.name != array.GetName()) continue;
       choice.of_cells = cell_values == CellValues::constant;
+      choice.is_at_both = true;
       return;
     }
     choices.push_back({array.GetName(), of_cells});

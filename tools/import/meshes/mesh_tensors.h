@@ -33,6 +33,7 @@ enum class CellValues { linear, constant };
 struct ArrayChoice {
   std::string name;
   bool of_cells = false;
+  bool is_at_both = false;  ///< There is one at points and one at cells.
 };
 
 /// The arrays at the cells or points of a mesh.

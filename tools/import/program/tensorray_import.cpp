@@ -154,6 +154,8 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
     tell_made(fmt::format("  a flat mesh: a slab of one voxel, {:.4g} thick{}", report.thickness,
                           settings.thickness ? "" : " (--thickness)"));
   if (report.mesh) print_sampling(report);
+  for (const std::string& note : report.notes) tell_made(fmt::format("  {}", escaped(note)));
+  for (const std::string& warning : report.warnings) tell({"tensorray: warning: " + warning}, false);
   if (report.boundary_triangles > 0)
     tell_made(
         fmt::format("{}: the body's surface, {} triangles", options.boundary.string(), report.boundary_triangles));
@@ -325,9 +327,9 @@ void add_import_options(CLI::App& program, Progress& progress) {
                   "(.cgns), an OpenFOAM "
                   "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), MetaImage (.mha "
                   ".mhd), MRtrix (.mif .mif.gz .mih), NumPy (.npy); "
-                  "of PLOT3D two, the grid and its q")
+                  "of PLOT3D two, the grid and its q; of Nemesis (NAME.N.0 ...) any of the pieces")
       ->required()
-      ->expected(1, 2)
+      ->expected(1, CLI::detail::expected_max_vector_size)
       ->option_text("FILE...");
   program.add_option("-o,--output", options->output, "The field to write, FILE.vdb")
       ->required()

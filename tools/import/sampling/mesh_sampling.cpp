@@ -60,6 +60,7 @@ Norms norms_of_cells(const double* tensors, const Solid& solid, const AlignedBox
   return norms;
 }
 
+/// @throw std::invalid_argument if no tensor is finite.
 void report_native(const MeshSource& source, const AlignedBox3d& bounds, SamplingReport& report) {
   Norms norms = source.cell_tensors ? norms_of_cells(source.cell_tensors, source.solid, bounds, source.tolerance)
                                     : norms_of_points(source.mesh, source.point_tensors, source.solid, bounds);
@@ -68,6 +69,10 @@ void report_native(const MeshSource& source, const AlignedBox3d& bounds, Samplin
   report.of_cells = source.cell_tensors != nullptr;
   report.non_finite = static_cast<std::size_t>(norms.end() - finite_end);
   norms.erase(finite_end, norms.end());
+  if (norms.empty() && report.non_finite > 0)
+    throw std::invalid_argument(
+        fmt::format("all {} {} have NaN or infinite tensors: choose another array or step of time, or other --bounds",
+                    report.non_finite, report.of_cells ? "cells" : "points"));
   std::tie(report.native_peak, report.native_median) = peak_and_median(norms);
 }
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include <vtkSmartPointer.h>
@@ -18,6 +19,7 @@ struct MeshFile {
   int steps = 1;  ///< Of time; 0 or 1 if it has none.
   /// Reads the data set, or a tree of them, at a step from 0 on. @throw std::runtime_error naming the file and the fix.
   std::function<vtkSmartPointer<vtkDataObject>(int step)> read;
+  std::vector<std::string> notes{};  ///< For the user: guesses, and what is left out.
 };
 
 /// What reading a file may take at most, bytes: a small one may announce any number of points. (LZMA makes 7000 bytes

@@ -12,7 +12,6 @@
 #include <vtkCompositeDataSet.h>
 #include <vtkDataSet.h>
 #include <vtkDataSetReader.h>
-#include <vtkExodusIIReader.h>
 #include <vtkInformation.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
@@ -27,12 +26,12 @@
 #include "base/text/short_lines.h"
 #include "base/text/text.h"
 #include "tools/import/cases/ensight.h"
+#include "tools/import/cases/exodus.h"
 #include "tools/import/cases/openfoam.h"
 #include "tools/import/hdf5/hdf5_meshes.h"
 #include "tools/import/vtk/polyhedra.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk_formats/array_names.h"
-#include "tools/import/vtk_formats/netcdf_end.h"
 #include "tools/import/vtk_formats/vtk_tags.h"
 
 namespace tensorray {
@@ -99,28 +98,6 @@ MeshFile open_legacy(const Path& path) {
             reader->ReadAllFieldsOn();
             reader->Update();
             for (vtkDataSet* const set : data_sets_in(reader->GetOutputDataObject(0))) name_tensors6(*set, path);
-            return reader->GetOutputDataObject(0);
-          }};
-}
-
-/// Reads the undisplaced mesh. By default VTK moves its points by any array that looks like a displacement.
-MeshFile open_exodus(const Path& path) {
-  require_whole_netcdf(path);
-  const auto reader = vtkSmartPointer<vtkExodusIIReader>::New();
-  reader->SetFileName(path.c_str());
-  reader->ApplyDisplacementsOff();
-  reader->UpdateInformation();
-  const int steps = reader->GetNumberOfTimeSteps();
-  return {steps, [=](int step) -> vtkSmartPointer<vtkDataObject> {
-            for (const auto kind : {vtkExodusIIReader::NODAL, vtkExodusIIReader::ELEM_BLOCK})
-              for (int i = 0; i < reader->GetNumberOfObjectArrays(kind); ++i)
-                reader->SetObjectArrayStatus(kind, reader->GetObjectArrayName(kind, i), 1);
-            for (int i = 0; i < reader->GetNumberOfObjects(vtkExodusIIReader::ELEM_BLOCK); ++i)
-              reader->SetObjectStatus(vtkExodusIIReader::ELEM_BLOCK, i, 1);
-            if (steps > 0) reader->SetTimeStep(step);
-            reader->Update();
-            for (vtkDataSet* const set : data_sets_in(reader->GetOutputDataObject(0)))
-              name_components(*set, *reader, path);
             return reader->GetOutputDataObject(0);
           }};
 }
