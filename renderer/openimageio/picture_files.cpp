@@ -52,6 +52,7 @@ OIIO::ImageSpec make_spec(const Image& image, const PictureFormat& format, const
 }
 
 bool is_tiff(const OIIO::ImageInput& input) { return std::strcmp(input.format_name(), "tiff") == 0; }
+bool is_exr(const OIIO::ImageInput& input) { return std::strcmp(input.format_name(), "openexr") == 0; }
 
 /// A tile may be larger than its picture, but memory is reserved for all of it before the file is found to be shorter.
 /// Lines are counted from a place that the file sets.
@@ -199,7 +200,7 @@ int find_colors(OIIO::ImageInput& input, NativeImage& image) {
     return find_channel(spec, "Y") >= 0 && find_grey(spec, found);
   };
   using Find = bool (*)(const OIIO::ImageSpec&, NativeImage&);
-  const bool has_parts = std::strcmp(input.format_name(), "openexr") == 0 && input.seek_subimage(1, 0);
+  const bool has_parts = is_exr(input) && input.seek_subimage(1, 0);
   for (const Find find : {Find(find_plain), Find(find_rgb), Find(find_y), Find(find_grey)})
     for (int part = 0; (part == 0 || has_parts) && input.seek_subimage(part, 0); ++part)
       if (!(has_parts && input.spec().deep) && find(input.spec(), image)) return part;
@@ -212,7 +213,7 @@ int find_colors(OIIO::ImageInput& input, NativeImage& image) {
 int find_channels(OIIO::ImageInput& input, const std::string& layer, NativeImage& image) {
   if (layer.empty()) {
     const int part = find_colors(input, image);
-    say_choice(input, part, image);
+    if (is_exr(input)) say_choice(input, part, image);  // Others may not be read after they have been searched.
     return part;
   }
   for (int part = 0; input.seek_subimage(part, 0); ++part)

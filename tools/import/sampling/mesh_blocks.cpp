@@ -318,7 +318,7 @@ TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress, std
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       vtkIdType* const begin = bins.cells.data() + bins.first[used[i]];
       vtkIdType* const end = bins.cells.data() + bins.first[used[i] + 1];
-      std::sort(begin, end, is_finer);
+      if (source.layers) std::sort(begin, end, is_finer);
       blocks[i].origin = TensorBlock::size * bins.block(used[i]);
       in_layers += fill_centres(source, begin, end, work, blocks[i]);
       if (blocks[i].active.any()) average_voxels(source, begin, end, work, blocks[i]);

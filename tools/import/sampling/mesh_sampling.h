@@ -35,9 +35,9 @@ struct SamplingReport {
 };
 
 /// Samples the tensors of with_tensors at the voxels of a lattice. A voxel is active if its centre is in a cell whose
-/// tensor is finite; where cells overlap, the smallest counts, and of cells of one size that with the lowest index. Of
-/// layers that overlap (layer_array), a voxel takes its value from one. Voxels within 1e-6 of the mesh's diagonal of a
-/// face count as inside. The lattice is centred in the box as far as the box extends.
+/// tensor is finite; where cells overlap, the cell with the lowest index counts. Where layers overlap (layer_array),
+/// the smallest cell with a finite tensor counts, and a voxel takes its value from one layer. Voxels within 1e-6 of the
+/// mesh's diagonal of a face count as inside. The lattice is centred in the box as far as the box extends.
 ///
 /// A voxel takes the tensor at its centre, interpolated in the cell that contains it (it is NaN if a point with a
 /// weight has NaN), or the cell's own if the mesh has tensors at cells alone. Where cells are thinner than voxels, it

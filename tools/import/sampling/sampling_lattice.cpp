@@ -10,10 +10,12 @@
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <vtkCellData.h>
 #include <vtkDataSet.h>
 
 #include "base/overloaded.h"
 #include "tools/import/meshes/mesh_cell.h"
+#include "tools/import/meshes/mesh_tensors.h"
 
 namespace tensorray {
 namespace {
@@ -87,7 +89,8 @@ Solid solid_part(vtkDataSet& mesh) {
   solid.boxes.resize(static_cast<std::size_t>(count));
   solid.thickness.resize(solid.boxes.size());
   std::vector<AlignedBox3d> hulls(solid.boxes.size());
-  std::vector<float> edges(solid.boxes.size());
+  const bool has_layers = mesh.GetCellData()->HasArray(layer_array) != 0;
+  std::vector<float> edges(has_layers ? solid.boxes.size() : 0);
   std::vector<std::atomic<bool>> used(static_cast<std::size_t>(mesh.GetNumberOfPoints()));
   MeshCell first;
   if (count > 0) first.load(mesh, 0);  // makes VTK's cached data on one thread
@@ -97,7 +100,7 @@ Solid solid_part(vtkDataSet& mesh) {
       if (!cell.load(mesh, id)) continue;
       solid.boxes[static_cast<std::size_t>(id)] = cell.box();
       solid.thickness[static_cast<std::size_t>(id)] = static_cast<float>(cell.thickness(Vector3d::Ones()));
-      if (const double edge = cell.edge(); std::isfinite(edge))
+      if (const double edge = has_layers ? cell.edge() : NAN; std::isfinite(edge))
         edges[static_cast<std::size_t>(id)] = static_cast<float>(edge);
       for (int i = 0; i < cell.points(); ++i) {
         hulls[static_cast<std::size_t>(id)].extend(cell.positions().col(i));

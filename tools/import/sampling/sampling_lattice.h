@@ -14,7 +14,7 @@ namespace tensorray {
 struct Solid {
   std::vector<Eigen::AlignedBox3d> boxes;  ///< Box of each cell of the mesh; empty for cells that are not used.
   std::vector<float> thickness;            ///< Of each used cell, world units: MeshCell::thickness.
-  std::vector<int> coarseness;             ///< Of each used cell: 0 for the largest, −4 for half of its edge, ...
+  std::vector<int> coarseness;             ///< Of cells in layers: 0 for the largest, −4 for half of its edge, ...
   Eigen::AlignedBox3d bounds;              ///< Bounds of the points of the used cells.
   std::vector<bool> points;                ///< For each point of the mesh: whether a used cell has it.
 };
