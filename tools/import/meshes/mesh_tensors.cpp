@@ -20,6 +20,7 @@
 #include <vtkUnsignedCharArray.h>
 
 #include "tools/import/lattices/tensor_order.h"
+#include "tools/import/meshes/cell_gradients.h"
 #include "tools/import/meshes/mesh_cell.h"
 
 namespace tensorray {
@@ -272,6 +273,13 @@ vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& ar
   const TensorOrder known_order = take == Take::tensor ? order_in(*given, order) : TensorOrder::full;
   const Array of_cells = tensors_of_cells ? tensors_in(point_values(*given), known_order) : nullptr;
   if (cell_values == CellValues::constant) return with_arrays(mesh, nullptr, of_cells);
+  if (array.of_cells && take != Take::tensor) {
+    const CellGradients gradients = cell_gradients(mesh, *given);
+    for (const Array& tensors : {gradients.of_points, gradients.of_cells})
+      if (take == Take::strain) make_symmetric(*tensors);
+    mark_unusable_points(mesh, *gradients.of_points);
+    return with_arrays(mesh, gradients.of_points, gradients.of_cells);
+  }
   const Array values = array.of_cells ? averaged_to_points(mesh, *given) : point_values(*given);
   const Array tensors = take == Take::tensor ? tensors_in(values, known_order) : gradient_of(mesh, values);
   if (take == Take::strain) make_symmetric(*tensors);

@@ -28,7 +28,9 @@
 #include "tools/import/cases/ensight.h"
 #include "tools/import/cases/exodus.h"
 #include "tools/import/cases/openfoam.h"
+#include "tools/import/cases/openfoam_walls.h"
 #include "tools/import/hdf5/hdf5_meshes.h"
+#include "tools/import/meshes/cell_graph.h"
 #include "tools/import/vtk/polyhedra.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk_formats/array_names.h"
@@ -156,6 +158,8 @@ vtkSmartPointer<vtkMultiBlockDataSet> read_case(const Path& folder, const OpenFo
   reader->EnableAllPointArrays();
   // The file has values at cells; they are averaged to points where cells are known to be finite.
   reader->CreateCellToPointOff();
+  // Of the parts of a polyhedron each would have its value, and a gradient beside it.
+  reader->DecomposePolyhedraOff();
   reader->UpdateTimeStep(time.value);
   reader->Update();
   complete_fields(*reader->GetOutput(), folder / time.folder);
@@ -166,6 +170,7 @@ vtkSmartPointer<vtkMultiBlockDataSet> read_case(const Path& folder, const OpenFo
 vtkSmartPointer<vtkDataObject> read_regions(const OpenFoamParts& parts, const OpenFoamTime& time) {
   const TemporaryFolder folder;
   std::map<std::string, DataSets> regions;  // A processor may have no part of a region.
+  OpenFoamWalls walls;
   for (const Path& one :
        parts.processors.empty() ? std::vector{parts.folder} : processor_cases(parts, time, folder / "")) {
     const vtkSmartPointer<vtkMultiBlockDataSet> blocks = read_case(one, time);
@@ -174,10 +179,13 @@ vtkSmartPointer<vtkDataObject> read_regions(const OpenFoamParts& parts, const Op
         check_geometry(*set, parts.folder);
         regions[block_name(*blocks, i)].push_back(set);
       }
+    add_openfoam_walls(one, time, walls);
   }
   DataSets merged;
   for (const auto& [name, sets] : regions) merged.push_back(one_data_set(sets));
-  return one_data_set(merged, false);
+  const vtkSmartPointer<vtkDataSet> all = one_data_set(merged, false);
+  for (const auto& [field, of_field] : walls) add_walls(*all, field, of_field);
+  return all;
 }
 
 /// @param path  The case's folder, a .foam file in it, or its system/controlDict.
