@@ -220,6 +220,11 @@ TEST(Exodus, VariablesThatAreNotThereAreLeftOut) {
     nc_inq_dimid(file, "num_dim", &dimensions[0]);
     nc_inq_dimid(file, "num_nodes", &dimensions[1]);
     nc_def_var(file, "coord", NC_DOUBLE, 2, dimensions, &id);
+    nc_enddef(file);
+    std::vector<double> x;
+    for (const auto axis : {0, 1, 2})
+      for (int i = 0; i < 12; ++i) x.push_back(axis == 0 ? i / 4 : axis == 1 ? i % 2 : i % 4 / 2);
+    nc_put_var_double(file, id, x.data());
   });
   EXPECT_THAT(refusal(path, "v_", Take::gradient), left_out("meshio convert a.e FILE.vtu"));
 }
