@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -16,6 +17,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+constexpr double same_place = 1e-8;       // Of the size of a mesh.
 constexpr double feature_cosine = 0.866;  // Of 30°.
 constexpr double along_view = 1e-3;       // Sine of the angle that rounding makes of faces that the view grazes.
 constexpr double piece_length = 2;        // Pixels; what hides a line is looked for in the middle of each piece.
@@ -27,21 +29,23 @@ struct BodyEdge {
   std::vector<Vector3d> normals;  ///< Of its faces.
 };
 
-/// Vertices at one place are one: meshes may have one for each triangle.
+/// Vertices at one place are one, as meshes may have one for each triangle.
 std::vector<BodyEdge> edges_of(const TriangleMesh& mesh) {
-  std::map<std::array<double, 6>, BodyEdge> edges;
+  using Place = std::array<double, 3>;
+  const double grid = same_place * mesh.bounds().diagonal().norm();
+  const auto place_of = [&](const Vector3d& at) {
+    return Place{std::round(at.x() / grid), std::round(at.y() / grid), std::round(at.z() / grid)};
+  };
+  std::map<std::pair<Place, Place>, BodyEdge> edges;
   for (const auto& triangle : mesh.triangles) {
     const auto corner = [&](std::size_t i) { return mesh.vertices[triangle[i % 3]]; };
     const Vector3d normal = (corner(1) - corner(0)).cross(corner(2) - corner(0)).stableNormalized();
     for (std::size_t i = 0; i < 3; ++i) {
-      std::array<Vector3d, 2> ends{corner(i), corner(i + 1)};
-      if (ends[0] == ends[1]) continue;
-      if (std::lexicographical_compare(ends[1].data(), ends[1].data() + 3, ends[0].data(), ends[0].data() + 3))
-        std::swap(ends[0], ends[1]);
-      const auto& [a, b] = ends;
-      BodyEdge& edge = edges[{a.x(), a.y(), a.z(), b.x(), b.y(), b.z()}];
-      edge.from = a;
-      edge.to = b;
+      const Place from = place_of(corner(i)), to = place_of(corner(i + 1));
+      if (from == to) continue;
+      BodyEdge& edge = edges[std::minmax(from, to)];
+      edge.from = corner(i);
+      edge.to = corner(i + 1);
       edge.normals.push_back(normal);
     }
   }

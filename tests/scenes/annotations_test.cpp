@@ -130,13 +130,12 @@ TEST(Annotations, ShowBodies) {
     Json json = Json::parse(method.text);
     json["obstacles"] = {{{"file", (folder / "box.ply").string()}}};
     with.text = json.dump();
-    const Rendered plain = rendered(with, nullptr), visible = rendered(with, "body"), hidden = rendered(with, "hidden");
+    const Rendered plain = rendered(with, nullptr), visible = rendered(with, "body");
     EXPECT_EQ(visible.display.pixels != plain.display.pixels, has_lines) << method.name;
     EXPECT_EQ(visible.render.linear.pixels, plain.render.linear.pixels) << method.name;
     EXPECT_EQ(visible.render.warnings.size() - plain.render.warnings.size(), has_lines ? 0u : 1u) << method.name;
-    EXPECT_EQ(hidden.display.pixels != plain.display.pixels, has_lines) << method.name;
-    EXPECT_EQ(rendered(method, "body").render.warnings.size(), rendered(method, nullptr).render.warnings.size() + 1);
   }
+  EXPECT_THAT(rendered(methods[0], "body").render.warnings.back(), HasSubstr("no lines of a body"));
 }
 
 /// Pixels of a plate have its size / resolution, those of an orthographic camera its height / resolution.

@@ -57,10 +57,7 @@ Results read_checkpoint(const std::filesystem::path& file, const RenderRun& run,
 std::filesystem::path checkpoint_file(const SceneDescription& description, const RunKeeping& keeping) {
   std::filesystem::path file = checkpoint_of(description, keeping);
   if (keeping.resume && !is_there(file))
-    throw SceneError(
-        printable(fmt::format("--resume: there is no checkpoint {}; without --resume, a render continues "
-                              "if there is one",
-                              file.string())));
+    throw SceneError(printable(fmt::format("--resume: there is no checkpoint {}; leave --resume out", file.string())));
   return file;
 }
 
@@ -157,18 +154,12 @@ void Checkpoint::remove() {
   file_.clear();  // The thread may be about to write.
 }
 
-/// Finds what the work belongs to while the files are those that were loaded.
-void Checkpoint::find_origin() {
-  const std::lock_guard lock(writing_);
-  if (origin_ || file_.empty()) return;
-  try {
-    origin_ = origin_of(scene_, false);
+void Checkpoint::run() {
+  try {  // While the files are those that were loaded.
+    const std::lock_guard lock(writing_);
+    if (!file_.empty() && !origin_) origin_ = origin_of(scene_, false);
   } catch (const std::exception&) {  // write() reports it.
   }
-}
-
-void Checkpoint::run() {
-  find_origin();
   const double interval = keeping_.interval;
   const std::chrono::duration<double> tick(interval > 0 ? std::min(longest_tick, interval / 2) : longest_tick);
   Clock::time_point written = Clock::now(), shown = written;

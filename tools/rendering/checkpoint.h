@@ -59,7 +59,6 @@ class Checkpoint {
  private:
   void run();
   WorkFile work_file();
-  void find_origin();
 
   const Scene& scene_;
   Job& job_;

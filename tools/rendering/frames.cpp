@@ -107,8 +107,8 @@ class Sequence {
       bound_memory_of(run_, description);
       tell({fmt::format("frame {}", frame)}, run_.quiet);
       RenderRun run = at_frame(run_, frame);
-      std::error_code none;  // Frames that were not begun have no checkpoint.
-      run.keeping.resume &= std::filesystem::exists(checkpoint_of(description, run.keeping), none);
+      // Frames that were not begun have no checkpoint.
+      run.keeping.resume &= std::filesystem::exists(checkpoint_of(description, run.keeping));
       Scene rendered = render_to_files(description, run, std::exchange(loaded_, {}), progress_);
       loaded_.emplace(std::move(rendered));
     } catch (const Cancelled&) {
