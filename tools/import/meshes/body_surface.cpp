@@ -23,6 +23,7 @@
 namespace tensorray {
 namespace {
 
+using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Tensor = Eigen::Map<const Eigen::Matrix<double, 9, 1>>;
@@ -47,25 +48,39 @@ struct Patch {
 };
 
 /// How many parts of the way between two points of a patch make the error of chords at most `tolerance`.
-int parts_between(const Patch& patch, const Vector2d& from, const Vector2d& to, double tolerance) {
+/// @param seen  Projects to the directions in which errors count.
+int parts_between(const Patch& patch, const Vector2d& from, const Vector2d& to, const Matrix3d& seen,
+                  double tolerance) {
   constexpr double max_parts = 64, rounding = 1e-6;
   const int n = patch.intervals;
   const auto at = [&](int i) { return patch.at(from + (static_cast<double>(i) / n) * (to - from)); };
   double bend = 0;  // The second derivative.
-  for (int i = 1; i < n; ++i) bend = std::max(bend, (at(i - 1) - 2 * at(i) + at(i + 1)).norm() * n * n);
+  for (int i = 1; i < n; ++i) bend = std::max(bend, (seen * (at(i - 1) - 2 * at(i) + at(i + 1))).norm() * n * n);
   return static_cast<int>(std::clamp(std::ceil(std::sqrt(bend / (8 * tolerance)) - rounding), 1.0, max_parts));
 }
 
-/// For the inside of a patch: along the lines from corners to the middles of opposite edges, or the diagonals and the
-/// lines between the middles of opposite edges.
+/// For an edge, along which points may be anywhere.
+int parts_along(const Patch& patch, const Vector2d& from, const Vector2d& to, double tolerance) {
+  const Vector3d chord = (patch.at(to) - patch.at(from)).normalized();
+  return parts_between(patch, from, to, Matrix3d::Identity() - chord * chord.transpose(), tolerance);
+}
+
+/// For the inside, whose points may be anywhere in its plane: along the lines from corners to the middles of opposite
+/// edges, or the diagonals and the lines between the middles of opposite edges.
 int parts_inside(const Patch& patch, double tolerance) {
   const std::size_t n = patch.corners.size();
-  const auto middle = [&](std::size_t k) { return 0.5 * (patch.corner(k % n) + patch.corner((k + 1) % n)); };
+  const auto corner = [&](std::size_t k) { return patch.corner(k % n); };
+  const auto middle = [&](std::size_t k) -> Vector2d { return 0.5 * (corner(k) + corner(k + 1)); };
+  const auto edge = [&](std::size_t from, std::size_t to) -> Vector3d {
+    return patch.at(corner(to)) - patch.at(corner(from));
+  };
+  const Vector3d normal = edge(0, 2).cross(n == 3 ? edge(0, 1) : edge(1, 3)).normalized();
+  const Matrix3d seen = normal * normal.transpose();
   int parts = 1;
-  for (std::size_t k = 0; k < n; ++k) {
-    if (n == 3) parts = std::max(parts, parts_between(patch, patch.corner(k), middle(k + 1), tolerance));
-    if (n == 4 && k < 2) parts = std::max(parts, parts_between(patch, patch.corner(k), patch.corner(k + 2), tolerance));
-    if (n == 4 && k < 2) parts = std::max(parts, parts_between(patch, middle(k), middle(k + 2), tolerance));
+  for (std::size_t k = 0; k < (n == 3 ? 3 : 2); ++k) {
+    const Vector2d opposite = n == 3 ? middle(k + 1) : corner(k + 2);
+    parts = std::max(parts, parts_between(patch, corner(k), opposite, seen, tolerance));
+    if (n == 4) parts = std::max(parts, parts_between(patch, middle(k), middle(k + 2), seen, tolerance));
   }
   return parts;
 }
@@ -85,7 +100,7 @@ class Tessellation {
       const auto [edge, is_new] = edges_.try_emplace({std::min(a, b), std::max(a, b), patch.middles[k]});
       if (!is_new) continue;
       const Vector2d from = patch.corner(k), to = patch.corner((k + 1) % patch.corners.size());
-      const int parts = parts_between(patch, from, to, tolerance_);
+      const int parts = parts_along(patch, from, to, tolerance_);
       edge->second = {vertex(a)};
       for (int i = 1; i < parts; ++i)
         edge->second.push_back(new_vertex(patch.at(from + (static_cast<double>(i) / parts) * (to - from))));
