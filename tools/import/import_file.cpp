@@ -28,6 +28,7 @@
 #include "tools/import/meshes/flat_mesh.h"
 #include "tools/import/meshes/mesh_boundary.h"
 #include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/meshes/triangle_shells.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
@@ -124,6 +125,23 @@ struct SilentVtk {
   ~SilentVtk() { vtkObject::SetGlobalWarningDisplay(before); }
 };
 
+/// Gives the grid the surface of the mesh, within the bounds that the user gives.
+void add_surface(vtkDataSet& mesh, const ImportSettings& settings, const Progress& progress, TensorGrid& grid,
+                 ImportReport& report) {
+  constexpr double tolerance = 0.01;  // Of a voxel.
+  progress.update("finding the surface", 0, 1);
+  report.surface = body_surface(mesh, tolerance * report.mesh->voxel.minCoeff());
+  TriangleMesh triangles = std::move(report.surface->mesh);
+  if (report.surface->open_edges > 0) return;
+  grid.surface = std::move(triangles);
+  if (!settings.sampling.bounds) return;
+  Eigen::AlignedBox3d box = *settings.sampling.bounds;
+  if (const int flat = settings.sampling.flat_axis; flat >= 0)  // Of a slab all of the thickness counts.
+    box.min()[flat] = grid.surface.bounds().min()[flat], box.max()[flat] = grid.surface.bounds().max()[flat];
+  grid.surface = cut_to(std::move(grid.surface), box);
+  report.surface->area = 0;
+}
+
 TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportSettings& settings,
                        const Progress& progress, ImportReport& report) {
   const SilentVtk silent;
@@ -147,6 +165,7 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
   warn_of_fills(fills, static_cast<std::size_t>(values.GetNumberOfTuples()), report);
   TensorGrid grid = sample_mesh(*mesh, settings.sampling, progress, *report.mesh);
   grid.name = array.name;
+  if (settings.surface && !vtkImageData::SafeDownCast(&data)) add_surface(*mesh, settings, progress, grid, report);
   return grid;
 }
 

@@ -37,6 +37,8 @@ class MeshCell {
   vtkGenericCell& vtk() const { return *cell_; }
   Shape shape() const { return shape_; }
   bool is_linear() const { return linear_; }
+  /// Of a cell of `tetrahedra`: the points of each face, around it, as numbers of the cell's points.
+  const std::vector<std::vector<std::size_t>>& faces() const { return faces_; }
 
   /// Contains the cell. For a curved cell it is larger than the box of its points.
   Eigen::AlignedBox3d box() const;

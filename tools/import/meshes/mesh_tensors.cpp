@@ -192,6 +192,8 @@ vtkSmartPointer<vtkDataSet> with_arrays(vtkDataSet& mesh, const Array& of_points
       attributes_of(*result, cells).AddArray(tensors);
     }
   }
+  result->GetCellData()->SetHigherOrderDegrees(mesh.GetCellData()->GetHigherOrderDegrees());
+  result->GetPointData()->SetRationalWeights(mesh.GetPointData()->GetRationalWeights());
   // VTK 9.1 keeps that a structured grid has no ghosts from when its structure was copied.
   result->UpdatePointGhostArrayCache();
   result->UpdateCellGhostArrayCache();
@@ -285,6 +287,11 @@ vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& ar
   if (take == Take::strain) make_symmetric(*tensors);
   mark_unusable_points(mesh, *tensors);
   return with_arrays(mesh, tensors, of_cells);
+}
+
+const double* made_tensors(vtkDataSetAttributes& attributes) {
+  auto* const array = vtkDoubleArray::SafeDownCast(attributes.GetArray(tensor_array));
+  return array && array->GetNumberOfComponents() == 9 ? array->GetPointer(0) : nullptr;
 }
 
 }  // namespace tensorray

@@ -91,4 +91,7 @@ vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& ar
                                          const std::optional<TensorOrder>& order,
                                          CellValues cell_values = CellValues::linear);
 
+/// The tensors that with_tensors makes, nine numbers each; null if there are none.
+const double* made_tensors(vtkDataSetAttributes& attributes);
+
 }  // namespace tensorray

@@ -55,7 +55,7 @@ struct ImportOptions {
   std::filesystem::path output, boundary;
   std::string name, units, steps = "last";
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
-  bool half = false, quiet = false, tells_progress = false;
+  bool no_surface = false, half = false, quiet = false, tells_progress = false;
 };
 
 /// What a name stands for; CLI11 has checked that there is such a name.
@@ -73,6 +73,7 @@ ImportSettings settings_of(const ImportOptions& options) {
   if (!options.strain_of.empty()) settings.take = Take::strain;
   settings.order = named(options.order, tensor_orders());
   settings.frame = named(options.frame, component_frames());
+  settings.surface = !options.no_surface;
   if (options.cells == "constant") settings.cell_values = CellValues::constant;
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
@@ -125,6 +126,16 @@ void print_sampling(const ImportReport& report) {
          false);
 }
 
+void print_surface(const BodySurface& surface, const TriangleMesh& triangles) {
+  const std::string inner =
+      surface.inner_faces > 0 ? fmt::format("; {} inner faces left out", surface.inner_faces) : "";
+  if (surface.open_edges > 0)
+    tell_made(fmt::format("  surface: none, as the cells' faces leave {} edges open{}", surface.open_edges, inner));
+  else
+    tell_made(fmt::format("  surface: {} triangles, volume {:.6g}{}{}", triangles.triangles.size(), triangles.volume(),
+                          surface.area > 0 ? fmt::format(", area {:.6g}", surface.area) : "", inner));
+}
+
 /// Progress as a line of phase, done and total, for a program that has started this one.
 void tell_progress(const std::string& phase, std::uint64_t done, std::uint64_t total) {
   static_cast<void>(write_whole(STDOUT_FILENO, fmt::format("{}\t{}\t{}\n", phase, done, total)));
@@ -154,6 +165,7 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
     tell_made(fmt::format("  a flat mesh: a slab of one voxel, {:.4g} thick{}", report.thickness,
                           settings.thickness ? "" : " (--thickness)"));
   if (report.mesh) print_sampling(report);
+  if (report.surface) print_surface(*report.surface, grid.surface);
   for (const std::string& note : report.notes) tell_made(fmt::format("  {}", escaped(note)));
   for (const std::string& warning : report.warnings) tell({"tensorray: warning: " + warning}, false);
   if (report.boundary_triangles > 0)
@@ -340,6 +352,8 @@ void add_import_options(CLI::App& program, Progress& progress) {
                   "Write the surface of the body that the mesh lies around, for `obstacles`: FILE.ply")
       ->check(check_ply_output)
       ->option_text("FILE");
+  program.add_flag("--no-surface", options->no_surface,
+                   "Leave out the surface of the body that a mesh is, within which light bends");
   program
       .add_option(
           "--steps", options->steps,

@@ -86,18 +86,12 @@ void report_sampled(const TensorGrid& grid, SamplingReport& report) {
   std::tie(report.sampled_peak, report.sampled_median) = peak_and_median(norms);
 }
 
-/// The tensors of with_tensors at points or cells; null if there are none.
-const double* tensors_in(vtkDataSetAttributes& attributes) {
-  auto* const array = vtkDoubleArray::SafeDownCast(attributes.GetArray(tensor_array));
-  return array && array->GetNumberOfComponents() == 9 ? array->GetPointer(0) : nullptr;
-}
-
 }  // namespace
 
 TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const Progress& progress,
                        SamplingReport& report) {
-  const double* const of_points = tensors_in(*mesh.GetPointData());
-  const double* const of_cells = tensors_in(*mesh.GetCellData());
+  const double* const of_points = made_tensors(*mesh.GetPointData());
+  const double* const of_cells = made_tensors(*mesh.GetCellData());
   if (!of_points && !of_cells) throw std::invalid_argument("the mesh has no tensors: it must come from with_tensors");
   const Solid solid = solid_part(mesh);
   const SamplingLattice lattice = sampling_lattice(mesh, solid, settings);

@@ -17,7 +17,8 @@ namespace tensorray {
 
 struct SamplingSettings {
   /// The number of voxels along the longest edge (int), the numbers along x, y, z (>= 2 each), or the edge of a voxel
-  /// (double). If none is given, a voxel is about as large as the median cell, with at most 2^21 voxels.
+  /// (double). If none is given, a voxel is about as large as the median cell, and fits between the two sides of a thin
+  /// mesh, with at most 2^21 voxels.
   std::variant<std::monostate, int, Eigen::Vector3i, double> resolution;
   std::optional<Eigen::AlignedBox3d> bounds;  ///< World; default: bounds of the three-dimensional cells.
   int flat_axis = -1;  ///< The axis across a slab (flat_mesh.h), along which there is one voxel; -1: none.

@@ -64,6 +64,9 @@ bool is_small(const Vector3d& voxels) {
 
 double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& box) {
   double voxel = std::min(typical_edge(mesh, solid, box), box.sizes().maxCoeff());
+  // Two across what is thin, if they are not too many.
+  if (const double thin = std::min(voxel, box.sizes().minCoeff()); is_small(voxels_along(box.sizes(), thin)))
+    voxel = thin;
   while (!is_small(voxels_along(box.sizes(), voxel))) voxel *= 1.01;
   return voxel;
 }
