@@ -25,6 +25,7 @@
 #include "tests/import/mesh_fixtures.h"
 #include "tests/import/vtk_files.h"
 #include "tools/import/import_file.h"
+#include "tools/import/meshes/cell_gradients.h"
 #include "tools/import/meshes/cell_graph.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 
@@ -173,6 +174,7 @@ TEST(CellGradients, LinearVelocitiesAreExactOnEveryMesh) {
   meshes.push_back(
       {"layers.vtu", joined(boxes({0, 1}, {0, 1}, {0, 1}), boxes({1, 2}, steps(0, 1, 3), steps(0, 1, 3)))});
   meshes.push_back({"polyhedra.vtu", polyhedra()});
+  meshes.push_back({"bent.vtu", unit_cube(VTK_TETRA, 4, bent)});
   for (const auto& [name, mesh] : meshes) {
     add_velocity(*mesh, linear, name == "polyhedra.vtu" ? middle_of : mean_of);
     write_xml(*mesh, folder / name);
@@ -247,10 +249,10 @@ void write_xdmf(vtkUnstructuredGrid& grid, const std::filesystem::path& path) {
                                 numbers_of(*grid.GetCellData()->GetArray("U"))));
 }
 
-/// The boxes of steps(0, 2, 4) x steps(0, 1, 3) x steps(0, 1, 3), whose points and cells have the order of CGNS.
+/// A grid of 4 x 4 x 4 boxes, whose points and cells have the order of CGNS.
 void write_cgns(vtkUnstructuredGrid& grid, const std::filesystem::path& path) {
   int file = 0, base = 0, zone = 0, id = 0, solution = 0;
-  const std::array<cgsize_t, 9> size{5, 4, 4, 4, 3, 3};
+  const std::array<cgsize_t, 9> size{5, 5, 5, 4, 4, 4};
   cg_open(path.c_str(), CG_MODE_WRITE, &file);
   cg_base_write(file, "Base", 3, 3, &base);
   cg_zone_write(file, base, "Zone", size.data(), CGNS_ENUMV(Structured), &zone);
@@ -269,9 +271,31 @@ void write_cgns(vtkUnstructuredGrid& grid, const std::filesystem::path& path) {
   ASSERT_EQ(cg_close(file), CG_OK);
 }
 
+/// Gold, in ASCII: numbers have six digits.
+void write_ensight(vtkUnstructuredGrid& grid, const std::filesystem::path& folder) {
+  const auto components = [](vtkDataArray& array) {
+    std::string text;
+    for (int c = 0; c < 3; ++c)
+      for (vtkIdType i = 0; i < array.GetNumberOfTuples(); ++i)
+        text += fmt::format("{:12.5e}\n", array.GetComponent(i, c));
+    return text;
+  };
+  std::string geometry = fmt::format(
+      "one\ntwo\nnode id assign\nelement id assign\npart\n{:10}\nbody\ncoordinates\n{:10}\n{}hexa8\n{:10}\n", 1,
+      grid.GetNumberOfPoints(), components(*grid.GetPoints()->GetData()), grid.GetNumberOfCells());
+  for (vtkIdType i = 0; i < grid.GetNumberOfCells(); ++i, geometry += "\n")
+    for (int k = 0; k < 8; ++k) geometry += fmt::format("{:10}", grid.GetCell(i)->GetPointId(k) + 1);
+  write_bytes(folder / "a.geo", geometry);
+  write_bytes(folder / "a.U",
+              fmt::format("a variable\npart\n{:10}\nhexa8\n{}", 1, components(*grid.GetCellData()->GetArray("U"))));
+  write_bytes(folder / "a.case",
+              "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: a.geo\nVARIABLE\n"
+              "vector per element: U a.U\n");
+}
+
 TEST(CellGradients, FormatsWithCellsAreAlike) {
   const TemporaryFolder folder;
-  const Grid grid = boxes(steps(0, 2, 4), steps(0, 1, 3), steps(0, 1, 3));
+  const Grid grid = boxes(steps(0, 2, 4), steps(0, 1, 4), steps(0, 1, 4));
   add_velocity(*grid, linear);
   write_legacy(*grid, folder / "a.vtk", true);
   write_xdmf(*grid, folder / "a.xdmf");
@@ -280,7 +304,8 @@ TEST(CellGradients, FormatsWithCellsAreAlike) {
   exodus->SetFileName((folder / "a.ex2").c_str());
   exodus->SetInputData(grid);
   exodus->Write();
-  for (const char* const name : {"a.vtk", "a.xdmf", "a.cgns", "a.ex2"}) {
+  write_ensight(*grid, folder);
+  for (const char* const name : {"a.vtk", "a.xdmf", "a.cgns", "a.ex2", "a.case"}) {
     expect_linear(gradients(folder / name, 0.15), name);
     EXPECT_LT(error_in(gradients(folder / name, 0.15, Take::strain),
                        [](const Vector3d&) { return Matrix3d(0.5 * (shear() + shear().transpose())); }),
@@ -416,6 +441,38 @@ void write_foam(const std::filesystem::path& folder, vtkUnstructuredGrid& grid, 
 
 std::string side_of_channel(const Vector3d& p) {
   return p.y() < 1e-9 ? "bottom" : p.y() > 1 - 1e-9 ? "top" : p.z() < 1e-9 || p.z() > 1 - 1e-9 ? "sides" : "ends";
+}
+
+TEST(CellGradients, ABaffleHasAWallOnEachSide) {
+  const Grid grid = boxes(steps(0, 1, 2), steps(0, 1, 4), steps(0, 1, 2));
+  add_velocity(*grid, [](const Vector3d& p) { return Vector3d(p.y() < 0.5 ? 1 - 2 * p.y() : 0, p.z(), p.x()); });
+  std::vector<Wall> walls;
+  for (const double side : {-1, 1})
+    for (const double x : {0.25, 0.75})
+      for (const double z : {0.25, 0.75}) walls.push_back({{x, 0.5, z}, {0, side, 0}, Wall::Kind::value, {0, z, x}});
+  add_walls(*grid, "U", walls);
+  const CellGradients gradients = cell_gradients(*grid, *grid->GetCellData()->GetArray("U"));
+  for (vtkIdType id = 0; id < grid->GetNumberOfCells(); ++id)
+    EXPECT_NEAR(gradients.of_cells->GetComponent(id, 1), middle_of(*grid->GetCell(id)).y() < 0.5 ? -2 : 0, 1e-12);
+}
+
+/// Cells 300 times as long as thick, whose neighbours along the layer are below its tangent plane.
+TEST(CellGradients, ThinLayersMayBeCurved) {
+  constexpr double around = 32;
+  const auto grid = curvilinear({9, 9, 4}, [](const Vector3d& p) {
+    const double angle = 16 * pi / around * p.x(), r = 1 + 0.01 * p.y() * p.y();
+    return Vector3d(r * std::cos(angle), r * std::sin(angle), p.z());
+  });
+  add_velocity(*grid, [&](const Vector3d& p) {
+    const double r = p.head<2>().norm();
+    return Vector3d(Vector3d(-p.y(), p.x(), 0) / r * 100 * (r - std::cos(pi / around)));
+  });
+  const CellGradients gradients = cell_gradients(*grid, *grid->GetCellData()->GetArray("U"));
+  for (vtkIdType i = 0; i < grid->GetNumberOfPoints(); ++i) {
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> t(gradients.of_points->GetPointer(9 * i));
+    const Vector3d p(grid->GetPoint(i)), normal = Vector3d(p.x(), p.y(), 0).normalized();
+    EXPECT_NEAR(Vector3d(-normal.y(), normal.x(), 0).dot(t * normal), 100, 5);  // 1 with twice the cells around.
+  }
 }
 
 TEST(CellGradients, PatchesOfOpenFoamAreWalls) {

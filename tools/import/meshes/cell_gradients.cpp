@@ -24,25 +24,35 @@ using Curvature = Eigen::Matrix<double, 9, 3>;  ///< Row 3 i + j, column k: âˆ‚Â
 
 /// A difference that a gradient is fitted to: from a cell to another, or to a wall of its own.
 struct Difference {
-  std::size_t cell = 0;
-  const Wall* wall = nullptr;  ///< Null: to the cell.
-  Step step = Step::Zero();    ///< From the centre of the cell.
-  Step factor = Step::Zero();  ///< The gradient is the sum of the differences times the factors.
+  std::size_t cell;
+  const Wall* wall;  ///< Null: to the cell.
+  Step factor;       ///< The gradient is the sum of the differences times the factors.
 };
 
 using Differences = std::vector<Difference>;
 
+/// From the centre of a cell.
+Step step_of(const CellGraph& graph, std::size_t id, const Difference& one) {
+  if (!one.wall) return graph.centres[one.cell] - graph.centres[id];
+  const Step step = one.wall->centre - graph.centres[id];
+  return one.wall->kind == Wall::Kind::value ? step : Step(one.wall->normal * one.wall->normal.dot(step));
+}
+
 /// Sets the factors. @return the least eigenvalue of the fit: the differences along its axis.
-double fit(Differences& differences) {
+double fit(const CellGraph& graph, std::size_t id, Differences& differences) {
   Matrix3d matrix = Matrix3d::Zero();
-  for (const Difference& one : differences) matrix += one.step * one.step.transpose() / one.step.squaredNorm();
+  for (Difference& one : differences) {
+    const Step step = step_of(graph, id, one);
+    if (step.squaredNorm() > 0) one.factor = step / step.squaredNorm();
+    matrix += step * one.factor.transpose();
+  }
   const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(matrix);
   const double none = 1e-6 * solver.eigenvalues()[2];
   Step inverse = Step::Zero();
   for (int k = 0; k < 3; ++k)
     if (solver.eigenvalues()[k] > none) inverse[k] = 1 / solver.eigenvalues()[k];
   const Matrix3d pseudo_inverse = solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose();
-  for (Difference& one : differences) one.factor = pseudo_inverse * one.step / one.step.squaredNorm();
+  for (Difference& one : differences) one.factor = pseudo_inverse * one.factor;
   return solver.eigenvalues()[0];
 }
 
@@ -52,39 +62,31 @@ struct Stencil {
   const Differences& of_vectors() const { return all.empty() ? cells : all; }
 };
 
-/// The differences from the neighbours, or from all cells around, and from the walls.
-Differences differences_of(const CellGraph& graph, std::size_t id, const std::vector<vtkIdType>& others,
-                           bool with_walls) {
-  Differences differences;
-  for (const vtkIdType other : others) {
-    const Step step = graph.centres[static_cast<std::size_t>(other)] - graph.centres[id];
-    if (step.squaredNorm() > 0) differences.push_back({static_cast<std::size_t>(other), nullptr, step, {}});
-  }
-  for (const Wall& wall : graph.walls[id]) {
-    const Step step = wall.centre - graph.centres[id], along_normal = wall.normal * wall.normal.dot(step);
-    const Step& used = wall.kind == Wall::Kind::value ? step : along_normal;
-    if (with_walls && used.squaredNorm() > 0) differences.push_back({id, &wall, used, {}});
-  }
-  return differences;
-}
-
 Stencil stencil_of(vtkDataSet& mesh, const CellGraph& graph, std::size_t id) {
   constexpr double enough = 0.3;  // A corner of a grid of boxes has 1, as directions have unit length.
   const auto fitted_to = [&](bool with_walls) {
-    Differences differences = differences_of(graph, id, graph.neighbours[id], with_walls);
-    if (fit(differences) >= enough) return differences;
-    differences = differences_of(graph, id, cells_around(mesh, graph, static_cast<vtkIdType>(id)), with_walls);
-    fit(differences);
+    Differences differences;
+    for (const bool widened : {false, true}) {
+      differences.clear();
+      const std::vector<vtkIdType> others =
+          widened ? cells_around(mesh, graph, static_cast<vtkIdType>(id)) : graph.neighbours[id];
+      differences.reserve(others.size() + (with_walls ? graph.walls[id].size() : 0));
+      for (const vtkIdType other : others)
+        differences.push_back({static_cast<std::size_t>(other), nullptr, Step::Zero()});
+      if (with_walls)
+        for (const Wall& wall : graph.walls[id]) differences.push_back({id, &wall, Step::Zero()});
+      if (fit(graph, id, differences) >= enough) break;
+    }
     return differences;
   };
   return {fitted_to(false), graph.walls[id].empty() ? Differences() : fitted_to(true)};
 }
 
 /// The vector's difference without what its curvature adds.
-Step difference(const Difference& one, const Eigen::Map<const Eigen::Matrix3Xd>& vectors, const Step& from,
-                const Curvature& curvature) {
-  const Eigen::Matrix<double, 9, 1> change = curvature * one.step;
-  const Step bend = Eigen::Map<const Gradient>(change.data()) * one.step;
+Step difference(const Difference& one, const Step& step, const Eigen::Map<const Eigen::Matrix3Xd>& vectors,
+                const Step& from, const Curvature& curvature) {
+  const Eigen::Matrix<double, 9, 1> change = curvature * step;
+  const Step bend = Eigen::Map<const Gradient>(change.data()) * step;
   if (!one.wall) return vectors.col(static_cast<Eigen::Index>(one.cell)) - from - 0.5 * bend;
   const Wall& wall = *one.wall;
   if (wall.kind == Wall::Kind::value) return wall.value - from - 0.5 * bend;
@@ -119,7 +121,8 @@ Fields fitted(const CellGraph& graph, const std::vector<Stencil>& stencils,
       Gradient sum = Gradient::Zero();
       const Step from = vectors.col(static_cast<Eigen::Index>(id));
       for (const Difference& one : stencils[id].of_vectors())
-        sum.noalias() += difference(one, vectors, from, fields.curvatures[id]) * one.factor.transpose();
+        sum.noalias() +=
+            difference(one, step_of(graph, id, one), vectors, from, fields.curvatures[id]) * one.factor.transpose();
       const double change = (sum - fields.gradients[id]).norm();
       if (!(change <= changes[id])) return;
       if (round > 0) changes[id] = change;  // The first one is the gradient itself.

@@ -21,8 +21,9 @@ struct CellGradients {
 /// cells with a common point are used. Then the gradient's own gradient, fitted alike, corrects the differences for
 /// curvature, and extends the gradient linearly to the cell's points, which have the mean of what their cells say.
 ///
-/// Exact for linear vectors everywhere; second order for smooth ones, also at the border. Along an axis with one cell,
-/// the derivative is zero. Cells are used that MeshCell loads and whose vector is finite.
+/// Exact for linear vectors everywhere. For smooth ones, also at the border, of second order on grids of hexahedra, and
+/// of order 1.5 with bent tetrahedra. Along an axis with one cell, the derivative is zero. Cells are used that MeshCell
+/// loads and whose vector is finite.
 /// Threads: uses all; the result does not depend on their number.
 CellGradients cell_gradients(vtkDataSet& mesh, vtkDataArray& vectors);
 

@@ -78,10 +78,10 @@ ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& names, Take take = 
 /// The points and cells of a mesh with one point array `tensor_array`: a vtkDoubleArray of nine components, row by
 /// row. The tensors are the array's components (six, nine or more; of more than nine the first six are the tensor,
 /// and the others are derived from it), or derivatives that are computed on the mesh itself, before any resampling.
-/// Cell arrays are first averaged to points, over the cells that MeshCell uses and whose values are finite. The result
-/// is NaN at points whose tensor is not finite, and at hidden points. Derivatives do not use cells with points that are
-/// hidden or not finite. Where the tensors themselves are an array of cells, the mesh also has it as a cell array
-/// `tensor_array`, and no point array if `cell_values` is constant.
+/// Tensors of cells are averaged to points, over the cells that MeshCell uses and whose values are finite. Derivatives
+/// of vectors of cells are those of cell_gradients.h. The result is NaN at points whose tensor is not finite, and at
+/// hidden points. Derivatives do not use cells with points that are hidden or not finite. Where the array is one of
+/// cells, the mesh also has a cell array `tensor_array`, and no point array if `cell_values` is constant.
 /// @param order  Order of six components, and of more than nine. Not needed if the components' names tell it (XX, YY,
 /// ...); then it must not contradict them.
 /// @return a mesh that shares the geometry of the given one, and keeps its vtkGhostType.
