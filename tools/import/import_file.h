@@ -41,9 +41,9 @@ struct ImportReport {
   std::optional<SamplingReport> mesh;
   std::size_t mesh_cells = 0, boundary_triangles = 0;
   std::optional<BodySurface> surface;  ///< Without its triangles, which the grid has.
-  double thickness = 0;               ///< Of the slab that a flat mesh has become; 0: it was none.
-  std::vector<std::string> notes;     ///< Of the mesh: guesses that were made, and what was left out, for the user.
-  std::vector<std::string> warnings;  ///< Of all formats: tensors that are hardly meant.
+  double thickness = 0;                ///< Of the slab that a flat mesh has become; 0: it was none.
+  std::vector<std::string> notes;      ///< Of the mesh: guesses that were made, and what was left out, for the user.
+  std::vector<std::string> warnings;   ///< Of all formats: tensors that are hardly meant.
 };
 
 /// Reads voxels as they are, and samples meshes. The grid gets the array's name, and its source as metadata. VTK's

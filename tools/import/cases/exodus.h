@@ -1,8 +1,8 @@
 #pragma once
 /// @file tools/import/cases/exodus.h
 /// Reads ExodusII files, and checks first which variables and steps they really have: VTK's reader returns memory that
-/// nobody wrote for variables that are announced and missing, and netCDF's fill value for steps that were never written.
-/// The format: https://sandialabs.github.io/seacas-docs/exodusII-new.pdf
+/// nobody wrote for variables that are announced and missing, and netCDF's fill value for steps that were never
+/// written. The format: https://sandialabs.github.io/seacas-docs/exodusII-new.pdf
 
 #include <vector>
 

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <vtkCellData.h>
 #include <vtkDataSet.h>
-#include <vtkDoubleArray.h>
 #include <vtkIntArray.h>
 #include <vtkPointData.h>
 
