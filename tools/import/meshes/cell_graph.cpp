@@ -47,16 +47,16 @@ void for_each_cell(vtkDataSet& mesh, const Visit& visit) {
 }
 
 /// A face of a cell: its corners, counter-clockwise or clockwise, and its area, which points out of the cell.
-struct CellFace {
+struct GraphFace {
   vtkIdType cell = 0;
   Ids corners;
   Eigen::Matrix3Xd positions;
   FaceMeasure measure;
 };
 
-CellFace face_of(MeshCell& cell, vtkIdType id, int index) {
+GraphFace face_of(MeshCell& cell, vtkIdType id, int index) {
   vtkCell& face = *cell.vtk().GetFace(index);
-  CellFace result{id, {}, Eigen::Matrix3Xd(3, face.GetNumberOfEdges()), {}};
+  GraphFace result{id, {}, Eigen::Matrix3Xd(3, face.GetNumberOfEdges()), {}};
   for (int i = 0; i < face.GetNumberOfEdges(); ++i) {
     const int corner = face.GetCellType() == VTK_PIXEL && i > 1 ? 5 - i : i;
     result.corners.push_back(face.GetPointId(corner));
@@ -124,7 +124,7 @@ bool is_at(const CellGraph& graph, vtkIdType cell, vtkIdType point) {
 }
 
 /// Appends the other cells that have all corners of a face. @return whether there are some.
-bool find_across(const CellGraph& graph, const CellFace& face, Ids& found) {
+bool find_across(const CellGraph& graph, const GraphFace& face, Ids& found) {
   const std::size_t before = found.size(), corner = at(graph.same[at(face.corners.front())]);
   for (std::size_t i = graph.first[corner]; i < graph.first[corner + 1]; ++i)
     if (graph.cells[i] != face.cell && std::all_of(face.corners.begin() + 1, face.corners.end(), [&](vtkIdType p) {
@@ -168,7 +168,7 @@ void link_points(vtkDataSet& mesh, CellGraph& graph) {
 }
 
 /// Makes cells neighbours whose faces lie on each other without having the same corners.
-void join_open_faces(std::vector<CellFace>& faces, CellGraph& graph) {
+void join_open_faces(std::vector<GraphFace>& faces, CellGraph& graph) {
   std::sort(faces.begin(), faces.end(),
             [](const auto& a, const auto& b) { return std::tie(a.cell, a.corners) < std::tie(b.cell, b.corners); });
   vtkNew<vtkPolyData> polygons;
@@ -176,7 +176,7 @@ void join_open_faces(std::vector<CellFace>& faces, CellGraph& graph) {
   points->SetDataTypeToDouble();
   polygons->SetPoints(points);
   polygons->AllocateEstimate(static_cast<vtkIdType>(faces.size()), 4);
-  for (const CellFace& face : faces) {
+  for (const GraphFace& face : faces) {
     Ids ids;
     for (const auto& corner : face.positions.colwise()) ids.push_back(points->InsertNextPoint(corner.data()));
     polygons->InsertNextCell(VTK_POLYGON, static_cast<int>(ids.size()), ids.data());
@@ -186,7 +186,7 @@ void join_open_faces(std::vector<CellFace>& faces, CellGraph& graph) {
   locator->SetDataSet(polygons);
   locator->BuildLocator();
   vtkNew<vtkIdList> found;
-  for (const CellFace& face : faces) {
+  for (const GraphFace& face : faces) {
     const Eigen::AlignedBox3d box(face.positions.rowwise().minCoeff(), face.positions.rowwise().maxCoeff());
     constexpr double gap = 1e-3;  // Of curved faces that two blocks divide differently.
     const double reach = gap * box.diagonal().norm();
@@ -195,7 +195,7 @@ void join_open_faces(std::vector<CellFace>& faces, CellGraph& graph) {
     for (std::size_t k = 0; k < 6; ++k) bounds[k] = centre[static_cast<Eigen::Index>(k / 2)] + (k % 2 ? reach : -reach);
     locator->FindCellsWithinBounds(bounds.data(), found);
     for (const vtkIdType i : *found) {
-      const CellFace& other = faces[at(i)];
+      const GraphFace& other = faces[at(i)];
       const Vector3& area = other.measure.area;
       if (other.cell == face.cell || area.dot(face.measure.area) >= 0) continue;
       if (std::abs(area.normalized().dot(centre - other.measure.centre)) > reach) continue;
@@ -220,13 +220,13 @@ void make_mutual(std::vector<Ids>& neighbours) {
 
 /// Finds the neighbours and the walls.
 void link_cells(vtkDataSet& mesh, const WallFinder& finder, CellGraph& graph) {
-  std::vector<CellFace> open;
+  std::vector<GraphFace> open;
   std::mutex lock;
   for_each_cell(mesh, [&](vtkIdType id, MeshCell& cell) {
     if (!graph.used[at(id)]) return;
     vtkNew<vtkIdList> scratch;
     for (int i = 0; i < cell.vtk().GetNumberOfFaces(); ++i) {
-      CellFace face = face_of(cell, id, i);
+      GraphFace face = face_of(cell, id, i);
       if (face.measure.area.isZero(0)) continue;
       if (const std::optional<Wall> wall = finder.find(face.measure, *scratch)) {
         graph.walls[at(id)].push_back(*wall);
