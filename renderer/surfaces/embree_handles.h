@@ -104,7 +104,7 @@ inline void intersect(RTCScene scene, std::vector<RTCRayHit>& rays) {
 struct MetTriangle {
   unsigned geometry, primitive;
   float distance, u, v;
-  float cosine;  // Of the ray's direction and the triangle's normal.
+  float along;  // The ray's direction times the triangle's normal, of any length.
 };
 
 /// Calls `add` for each triangle along a ray, some of them more than once. The scene needs `all_triangles_flag`.
@@ -121,7 +121,7 @@ inline void visit_all(RTCScene scene, RTCRayHit ray, void (*add)(void*, const Me
       const RTCHit hit = rtcGetHitFromHitN(arguments->hit, arguments->N, 0);
       const Eigen::Vector3f normal(hit.Ng_x, hit.Ng_y, hit.Ng_z);
       const float along = normal.dot(Eigen::Vector3f(ray.dir_x, ray.dir_y, ray.dir_z));
-      all->add(all->user, {hit.geomID, hit.primID, ray.tfar, hit.u, hit.v, along / normal.norm()});
+      all->add(all->user, {hit.geomID, hit.primID, ray.tfar, hit.u, hit.v, along});
       arguments->valid[0] = 0;
     }
   } all{{}, add, user};

@@ -12,8 +12,7 @@ namespace {
 using embree::check;
 using embree::Owned;
 
-constexpr float clear_of_edges = 1e-5f;    // Barycentric; Embree meets both triangles within 2e-7 of an edge.
-constexpr float clear_of_grazing = 1e-3f;  // Cosine.
+constexpr float clear_of_edges = 1e-5f;  // Barycentric; Embree meets both triangles within 2e-7 of an edge.
 
 /// Sorts by mesh and triangle. Embree may report a triangle more than once if its search tree has split it.
 template <class Triangle>
@@ -159,10 +158,9 @@ void TriangleScene::crossings(const Eigen::Vector3d& from, const Eigen::Vector3d
     min_distance = std::max(min_distance, *way);
   }
   const auto add = [](void* user, const embree::MetTriangle& met) {
-    const bool is_clear =
-        std::min({met.u, met.v, 1 - met.u - met.v}) > clear_of_edges && std::abs(met.cosine) > clear_of_grazing;
+    const bool is_clear = std::min({met.u, met.v, 1 - met.u - met.v}) > clear_of_edges;
     static_cast<std::vector<TriangleCrossing>*>(user)->push_back(
-        {met.distance, met.geometry, met.primitive, met.cosine > 0 ? 1 : -1, is_clear});
+        {met.distance, met.geometry, met.primitive, met.along > 0 ? 1 : -1, is_clear});
   };
   embree::visit_all(state_->scene.get(), state_->ray(from, direction, min_distance, max_distance), add, &crossings);
   if (crossings.size() > 1) sort_and_join(crossings);

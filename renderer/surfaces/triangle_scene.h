@@ -30,7 +30,7 @@ struct TriangleCrossing {
   double distance = 0;  ///< As that of TriangleHit.
   std::uint32_t mesh = 0, triangle = 0;
   int sign = 0;           ///< 1: the line goes out, where normals point outwards; −1: in.
-  bool is_clear = false;  ///< False at edges and vertices, where it may be counted twice, and where it is grazed.
+  bool is_clear = false;  ///< False at edges and vertices, where it may be counted twice.
 };
 
 /// Immutable; any number of threads may query it at once. It keeps no reference to the meshes.

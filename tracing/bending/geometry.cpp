@@ -137,35 +137,52 @@ struct Geometry::State {
   /// @param crossings  All of the light.
   bool is_inside_beyond(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, const Crossings& crossings,
                         std::size_t first, std::size_t last) const {
-    int count = 0;
+    int count = 0, inside = 0;
     bool is_clear = true;
-    for (std::size_t i = crossings.size(); i-- > last;) {
+    for (std::size_t i = crossings.size(); i-- > first;) {
       count += crossings[i].sign;
+      if (i >= last) inside = count;
       is_clear = is_clear && crossings[i].is_clear && count >= 0;
     }
-    if (is_clear) return count > 0;
-    Eigen::Vector3d past = direction;
+    if (is_clear) return inside > 0;
+    Eigen::Vector3d past = Eigen::Vector3d::Zero();
     for (std::size_t i = first; i < last; ++i)
-      past += 2 * crossings[i].sign * exact(cut, from, direction, crossings[i]).normal;
+      past += crossings[i].sign * exact(cut, from, direction, crossings[i]).normal;
     const double at = last > first ? crossings[last - 1].distance : 0;
-    return is_inside(from + at * direction + 3 * margin * past.normalized());
+    return is_inside(from + at * direction + margin * (3 * direction + 2 * past.normalized()));
   }
 
-  /// Whether the cut surrounds a point that is not on it.
+  /// Whether the cut surrounds a point. On the skin it does not: there is nothing on one of its sides.
   bool is_inside(const Eigen::Vector3d& point) const {
-    int count = 0;
-    for (const Eigen::Vector3d& direction : generic_directions) {
-      Crossings crossings;
-      cross_cut(point, direction, 0, infinite, crossings);
-      count = 0;
-      bool is_clear = true;
-      for (const TriangleCrossing& crossing : crossings) {
-        count += crossing.sign;
-        is_clear = is_clear && crossing.is_clear;
+    bool is_known = false;
+    for (const Eigen::Vector3d& direction : generic_directions)
+      for (const double sense : {1.0, -1.0}) {
+        Crossings crossings;
+        cross_cut(point, sense * direction, 0.3 * margin, infinite, crossings);
+        int count = 0;
+        bool is_clear = true;
+        for (const TriangleCrossing& crossing : crossings) {
+          count += crossing.sign;
+          is_clear = is_clear && crossing.is_clear;
+        }
+        if (is_clear && count <= 0) return false;
+        is_known = is_known || is_clear;
       }
-      if (is_clear) break;
+    return is_known;
+  }
+
+  /// Where light leaves the bounds, by the planes of their triangles.
+  std::optional<Hit> exit_of_bounds(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                                    double max_distance) const {
+    constexpr double min_slope = 1e-12;
+    Hit exit{infinite, Surface::bounds, Eigen::Vector3d::Zero()};
+    for (std::uint32_t i = 0; i < surfaces.bounds.triangles.size(); ++i) {
+      const Hit hit = exact(bounds, from, direction, TriangleHit{infinite, 0, i});
+      if (hit.normal.dot(direction) > min_slope && hit.distance < exit.distance) exit = hit;
     }
-    return count > 0;
+    exit.distance = std::max(exit.distance, 0.0);
+    if (!(exit.distance <= max_distance)) return std::nullopt;
+    return exit;
   }
 
   /// `Geometry::crossing` of the cut.
@@ -233,7 +250,9 @@ Eigen::AlignedBox3d Geometry::absorbers_within(const Eigen::AlignedBox3d& region
 std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double max_distance) const {
   if (surface == Surface::cut) return state_->cut_crossing(inwards, origin, direction, max_distance);
-  constexpr int max_crossings = 10000;  // Of one line with one mesh; rounding must not make this loop endless.
+  // A line crosses a convex mesh once in each sense, where two triangles may meet. Along a face, rounding may show it
+  // the face again and again.
+  constexpr int max_crossings = 8;
   double from = -state_->margin;
   for (int i = 0; i < max_crossings; ++i) {
     auto hit = state_->nearest(state_->bounds, origin, direction, from, max_distance + state_->margin);
@@ -243,10 +262,10 @@ std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen
       return hit;
     }
     const double next = std::max(hit->distance, from) + state_->margin;
-    if (!(next > from)) break;  // Double precision does not resolve the margin at this distance.
+    if (!(next > from)) return std::nullopt;  // Double precision does not resolve the margin at this distance.
     from = next;
   }
-  return std::nullopt;
+  return inwards ? std::nullopt : state_->exit_of_bounds(origin, direction, max_distance);
 }
 
 bool Geometry::inside_cut(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const {

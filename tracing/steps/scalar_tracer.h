@@ -96,9 +96,9 @@ class Tracer {
   /// way of light: it is moved on, a little more after each step. @param way  Its length since it entered the cut.
   std::optional<RayEnd> leave_cut(double way) {
     ++steps_;
-    if (way <= geometry_.margin()) {
-      Hit ahead;
-      ahead.distance = geometry_.margin() * steps_;
+    Hit ahead;
+    ahead.distance = geometry_.margin() * (1 + steps_ / 8.0);
+    if (way <= ahead.distance) {
       if (const auto end = reach(ahead)) return end;
     }
     const auto end = cross_box();
