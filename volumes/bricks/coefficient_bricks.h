@@ -61,8 +61,8 @@ struct CoefficientBricks {
 /// Places in slabs across x, in their order: each of at most `most` places, or with one place along x.
 std::vector<PlaceNumbers> slabs_of(const std::vector<Eigen::Vector3i>& places, std::size_t most);
 
-/// @param extent  As TensorField::voxels. @param interpolant  Of a linear field, `extend` only if it has a surface. Runs
-/// on all threads.
+/// @param extent  As TensorField::voxels. @param interpolant  Of a linear field, `extend` only if it has a surface.
+/// Runs on all threads.
 CoefficientBricks coefficient_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent,
                                      const Interpolant& interpolant);
 

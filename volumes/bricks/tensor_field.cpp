@@ -100,7 +100,9 @@ TensorField::TensorField(const TensorGrid& grid, const Interpolant& interpolant)
     : TensorField(view_of(grid), interpolant) {}
 
 TensorField::TensorField(const BlockSource& source, const Interpolant& interpolant)
-    : interpolant_(interpolant), to_world_(source.to_world), to_index_(source.to_world.inverse()),
+    : interpolant_(interpolant),
+      to_world_(source.to_world),
+      to_index_(source.to_world.inverse()),
       surface_(std::make_shared<const TriangleMesh>(source.surface)) {
   const Eigen::AlignedBox3i active = active_box(source.shapes);
   if (active.isEmpty()) throw std::invalid_argument("the tensor field has no active voxel");
@@ -163,8 +165,8 @@ std::vector<Eigen::Vector3d> TensorField::corners() const { return corners_of(in
 double TensorField::surface_beyond() const {
   const Eigen::AlignedBox3d body = index_box(surface(), to_index_);
   if (body.isEmpty()) return 0;
-  const double beyond = std::max((index_bounds_.min() - body.min()).maxCoeff(),
-                                 (body.max() - index_bounds_.max()).maxCoeff());
+  const double beyond =
+      std::max((index_bounds_.min() - body.min()).maxCoeff(), (body.max() - index_bounds_.max()).maxCoeff());
   return beyond > on_voxel ? beyond : 0;
 }
 

@@ -75,7 +75,7 @@ struct FieldParts {
   std::vector<Eigen::Vector3i> bricks;  ///< As `TensorField::bricks`.
   std::vector<float> strongest;         ///< TensorBrick::strongest of each.
   TriangleMesh surface;
-  BrickMemory memory;                   ///< In the order of `bricks`.
+  BrickMemory memory;  ///< In the order of `bricks`.
   double max_norm = 0;
 };
 

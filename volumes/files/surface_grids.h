@@ -1,10 +1,10 @@
 #pragma once
 /// @file volumes/files/surface_grids.h
 /// The surface of a body, as two grids of a field's file: NAME_surface_points, in index space of the field, so that who
-/// moves the field moves it, too, and NAME_surface_triangles, the numbers of their points. They are Vec3 grids of single
-/// precision, which all programs read. Their voxels, block by block, z fastest, are a list: two of them are a row of
-/// three numbers, the first one rounded, the second one what rounding has lost.
-/// Only .cpp files of this folder include this header: it includes all of OpenVDB.
+/// moves the field moves it, too, and NAME_surface_triangles, the numbers of their points. They are Vec3 grids of
+/// single precision, which all programs read. Their voxels, block by block, z fastest, are a list: two of them are a
+/// row of three numbers, the first one rounded, the second one what rounding has lost. Only .cpp files of this folder
+/// include this header: it includes all of OpenVDB.
 
 #include <filesystem>
 #include <set>
