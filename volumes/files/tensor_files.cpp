@@ -201,9 +201,9 @@ BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string
   result.name = field.name;
   result.to_world = common_transform(path, grids);
   result.metadata = metadata_of(file.metadata, *grids.front().file.grid);
-  result.surface = read_surface(path, file, field.name, result.to_world);
   const bool derives = derive != Derive::none;
   try {
+    result.surface = read_surface(path, file, field.name, result.to_world);
     result.shapes = find_blocks(path, grids, derives ? sizeof(SampleBlock) : min_brick_bytes);
     if (result.shapes.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
     if (derives) return derived_source(path, grids, derive, result);
