@@ -24,9 +24,9 @@
 #include "tools/import/lattice_files/lattice_files.h"
 #include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/flat_mesh.h"
-#include "tools/import/meshes/mesh_boundary.h"
 #include "tools/import/meshes/mesh_tensors.h"
-#include "tools/import/meshes/triangle_shells.h"
+#include "tools/import/surfaces/mesh_boundary.h"
+#include "tools/import/surfaces/triangle_shells.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
