@@ -26,9 +26,9 @@
 #include "tools/import/lattices/fill_values.h"
 #include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/flat_mesh.h"
-#include "tools/import/meshes/mesh_boundary.h"
 #include "tools/import/meshes/mesh_tensors.h"
-#include "tools/import/meshes/triangle_shells.h"
+#include "tools/import/surfaces/mesh_boundary.h"
+#include "tools/import/surfaces/triangle_shells.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/vtk_source.h"
 

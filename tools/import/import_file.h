@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "tools/import/lattices/lattice.h"
-#include "tools/import/meshes/body_surface.h"
 #include "tools/import/meshes/mesh_tensors.h"
 #include "tools/import/sampling/mesh_sampling.h"
+#include "tools/import/surfaces/body_surface.h"
 
 namespace tensorray {
 

@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/import/meshes/body_surface.h
+/// @file tools/import/surfaces/body_surface.h
 /// The surface of the body that a mesh is.
 
 #include <cstddef>

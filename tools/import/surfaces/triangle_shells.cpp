@@ -1,4 +1,4 @@
-#include "tools/import/meshes/triangle_shells.h"
+#include "tools/import/surfaces/triangle_shells.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "tools/import/meshes/body_surface.h"
+#include "tools/import/surfaces/body_surface.h"
 
 #include <algorithm>
 #include <array>
@@ -16,9 +16,9 @@
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 
-#include "tools/import/meshes/mesh_faces.h"
 #include "tools/import/meshes/mesh_tensors.h"
-#include "tools/import/meshes/triangle_shells.h"
+#include "tools/import/surfaces/mesh_faces.h"
+#include "tools/import/surfaces/triangle_shells.h"
 
 namespace tensorray {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/import/meshes/mesh_boundary.h"
+#include "tools/import/surfaces/mesh_boundary.h"
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@
 #include "base/geometry/ply_writer.h"
 #include "base/geometry/triangle_mesh.h"
 #include "tools/import/meshes/mesh_cell.h"
-#include "tools/import/meshes/mesh_faces.h"
+#include "tools/import/surfaces/mesh_faces.h"
 
 namespace tensorray {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/import/meshes/mesh_faces.h"
+#include "tools/import/surfaces/mesh_faces.h"
 
 #include <algorithm>
 #include <cstdint>

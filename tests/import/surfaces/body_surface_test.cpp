@@ -1,6 +1,6 @@
 // The surface of the body that a mesh is, of all types of cells.
 
-#include "tools/import/meshes/body_surface.h"
+#include "tools/import/surfaces/body_surface.h"
 
 #include <set>
 
@@ -16,7 +16,7 @@
 #include "tests/import/vtk_files.h"
 #include "tools/import/import_file.h"
 #include "tools/import/meshes/flat_mesh.h"
-#include "tools/import/meshes/triangle_shells.h"
+#include "tools/import/surfaces/triangle_shells.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
