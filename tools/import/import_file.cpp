@@ -128,7 +128,7 @@ struct SilentVtk {
 /// Gives the grid the surface of the mesh, within the bounds that the user gives.
 void add_surface(vtkDataSet& mesh, const ImportSettings& settings, const Progress& progress, TensorGrid& grid,
                  ImportReport& report) {
-  constexpr double tolerance = 0.01;  // Of a voxel.
+  constexpr double tolerance = 0.0025;  // Of a voxel.
   progress.update("finding the surface", 0, 1);
   report.surface = body_surface(mesh, tolerance * report.mesh->voxel.minCoeff());
   TriangleMesh triangles = std::move(report.surface->mesh);

@@ -193,7 +193,7 @@ std::vector<std::string> names_like(const fs::path& folder, const std::string& w
   const fs::path parent = fs::path(word).parent_path();
   std::vector<std::string> names;
   std::error_code none;
-  for (fs::directory_iterator file(fs::absolute(folder / parent), none), end; file != end; ++file) {
+  for (fs::directory_iterator file(fs::absolute(folder / word).parent_path(), none), end; file != end; ++file) {
     const std::string name = (parent / file->path().filename()).string();
     if (starts_with(name, word.substr(0, first)) && ends_with(name, word.substr(last + 1))) names.push_back(name);
   }
