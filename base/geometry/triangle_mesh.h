@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "base/geometry/box.h"
 
@@ -18,6 +18,17 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 
   Eigen::AlignedBox3d bounds() const { return box_of(vertices); }
+
+  /// What a closed mesh encloses; positive if the triangles face outwards.
+  double volume() const {
+    const Eigen::Vector3d center = bounds().center();  // Coordinates relative to the centre avoid cancellation.
+    double sum = 0;
+    for (const auto& t : triangles) {
+      const Eigen::Vector3d a = vertices[t[0]] - center, b = vertices[t[1]] - center;
+      sum += a.dot(b.cross(vertices[t[2]] - center));
+    }
+    return sum / 6;
+  }
 };
 
 }  // namespace tensorray

@@ -36,7 +36,7 @@ class Round {
   void share() {
     if (!ranks()) return;
     Archive mine;
-    copy(ranks()->rank(), mine);
+    if (units_.for_all || !is_root(ranks())) copy(ranks()->rank(), mine);
     const std::vector<std::string> given =
         units_.for_all ? ranks()->all_gather(mine.take()) : ranks()->gather(mine.take());
     for (std::size_t rank = 0; rank < given.size(); ++rank) {

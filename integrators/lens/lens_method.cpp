@@ -10,6 +10,7 @@
 #include "renderer/charts/grid_lines.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/outputs/body_outline.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/scene.h"
@@ -126,10 +127,14 @@ Image side_by_side(const std::vector<Image>& images) {
   return all;
 }
 
-void add_statistics(const LensPicture& picture, Statistics& statistics) {
+/// @param starts  Of the map.
+void add_statistics(const LensPicture& picture, std::size_t starts, Statistics& statistics) {
+  statistics.emitted.resize(picture.ends.size());
   statistics.ends.resize(picture.ends.size());
-  for (std::size_t channel = 0; channel < picture.ends.size(); ++channel)
+  for (std::size_t channel = 0; channel < picture.ends.size(); ++channel) {
+    statistics.emitted[channel] += starts;
     for (int end = 0; end < ray_end_count; ++end) statistics.ends[channel][end] += picture.ends[channel][end];
+  }
   statistics.ray_steps += picture.counts.ray_steps;
   statistics.tensor_samples += picture.counts.tensor_samples;
   statistics.seconds_drawing += picture.seconds_drawing;
@@ -194,10 +199,10 @@ void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const P
       draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
   const Plate& plane = light.setup.image.plane;
   all.pictures.push_back(make_image(picture));
-  if (settings_.obstacles == ObstacleLook::shaded)
+  if (settings_.obstacles == ObstacleLook::shaded && is_root(light.settings.job ? light.settings.job->ranks : nullptr))
     draw_obstacles(scene.geometry.surfaces(), light.setup, settings_.samples, all.pictures.back());
   if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, all.pictures.back());
-  add_statistics(picture, all.statistics);
+  add_statistics(picture, light.map.starts.size(), all.statistics);
   all.statistics.seconds_tracing += light.seconds_tracing;
   if (by_channel)
     // A white image has the radiance of a white diffuse surface in the scene's light.
@@ -208,10 +213,16 @@ void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const P
 Render LoadedLens::render_of(const Scene& scene, LensPictures all) const {
   Render result;
   result.linear = side_by_side(all.pictures);
+  const std::vector<OutlineStroke> outline = body_outline(scene, lens_.receiver);
+  const int width = all.pictures.front().width, count = static_cast<int>(all.pictures.size());
+  for (int i = 0; i < count; ++i)
+    for (const OutlineStroke& each : outline) {
+      const Eigen::Vector2d right(i * (result.linear.width - width) / std::max(1, count - 1), 0);
+      result.outline.push_back({each.from + right, each.to + right, each.is_hidden});
+    }
   if (!all.spectra.empty()) result.spectral = spectra_side_by_side(std::move(all.spectra));
   result.statistics = std::move(all.statistics);
-  for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)])
-    result.statistics.positions += count;
+  result.statistics.positions = result.statistics.emitted[reference_channel(scene)];
   result.metadata["tensorray:end"] = end_codes();
   result.view = picture_view(lens_.receiver);
   result.exposure = 0;  // Shows the colours of the image unchanged.

@@ -231,6 +231,12 @@ void add_context(const Scene& scene, const PathScene& paths, Job* job, const Pro
   if (context.obstacles)
     for (const std::filesystem::path& file : scene.description.obstacles)
       add_surface(read_mesh_surface(file), plain(0.6, 0.5));
+  if (context.body > 0 && scene.geometry.has_cut()) {
+    ShadedSurface body;
+    body.shape = *scene.geometry.surfaces().cut;
+    body.opacity = static_cast<float>(context.body);
+    add_surface(std::move(body), plain(0.6, 0.5));
+  }
   if (context.plate) add_surface(lit_plate(scene, job, progress), plain(0.8, 1));
   if (context.slice) add_surface(make_slice(scene, paths.lights.light, *context.slice), plain(0.8, 1));
   for (const IsosurfaceDescription& each : context.isosurfaces)

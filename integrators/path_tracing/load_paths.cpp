@@ -118,12 +118,14 @@ EnvironmentLight load_environment(const LightSourceDescription& description, con
 /// for the first channel.
 void count_ends(const Scene& scene, const std::vector<Path>& paths, Statistics& statistics) {
   statistics.positions = paths.size();
+  statistics.emitted.assign(scene.channels.size(), 0);
   statistics.ends.assign(scene.channels.size(), EndCounts{});
   for (const Path& path : paths) {
     const auto found = std::find_if(scene.channels.begin(), scene.channels.end(), [&](const LightChannel& channel) {
       return channel.flexibility == path.flexibility;
     });
     const auto channel = found == scene.channels.end() ? 0 : found - scene.channels.begin();
+    ++statistics.emitted[static_cast<std::size_t>(channel)];
     ++statistics.ends[static_cast<std::size_t>(channel)][static_cast<std::size_t>(path.end)];
   }
 }

@@ -33,6 +33,7 @@ std::vector<Eigen::Vector3d> points_of_interest(const Scene& scene, const Contex
   if (context.box || context.slice) add(scene.field.corners());
   if (context.obstacles)
     for (const TriangleMesh& mesh : scene.geometry.surfaces().obstacles) add(mesh.vertices);
+  if (context.body > 0 && scene.geometry.has_cut()) add(scene.geometry.surfaces().cut->vertices);
   if (context.plate) add(scene.geometry.surfaces().plate->corners());
   return points;
 }
@@ -162,6 +163,8 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
       write_tubes(file, tubes, paths, colors);
     };
   if (!has_picture) return result;
+  if (description.context.body > 0 && !scene.geometry.has_cut())
+    result.warnings.push_back("`/integrator/context/body` has no effect: the field has no surface (`/field/bounds`)");
 
   const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
     set_picture(picture, light, description, scene.description, render);

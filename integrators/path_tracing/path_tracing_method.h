@@ -73,6 +73,7 @@ struct IsosurfaceDescription {
 struct ContextDescription {
   bool box = true;        ///< The volume's edges.
   bool obstacles = true;  ///< The obstacles of the scene, as surfaces.
+  double body = 0;        ///< Opacity of the surface on which the field ends; 0: it is not shown.
   bool plate = false;     ///< The receiver, with the light of the photons on it.
   std::optional<SliceDescription> slice;
   std::vector<IsosurfaceDescription> isosurfaces;
@@ -196,6 +197,8 @@ inline void describe(IsosurfaceDescription& isosurface, KeyVisitor& visit) {
 inline void describe(ContextDescription& context, KeyVisitor& visit) {
   visit("box", context.box, "the volume's edges");
   visit("obstacles", context.obstacles, "the scene's obstacles as surfaces");
+  visit("body", context.body, "opacity of the surface on which the field ends (`field.bounds`); 0: it is not shown",
+        between(0, 1));
   visit("plate", context.plate, "the receiver, with the photons that fall on it");
   visit.section("slice", context.slice, "a plane through the volume, coloured by an invariant");
   visit.list("isosurfaces", context.isosurfaces, "surfaces on which an invariant has one value",

@@ -26,6 +26,14 @@ auto mean(PixelMean<size> PixelState::*member) {
   return [member](const SurfacePixel& pixel) { return (pixel.state.*member).get(); };
 }
 
+/// A mean over the rays that arrive. @param none  Where no ray does.
+auto mean_of_arrived(PixelMean<1> PixelState::*member, float none) {
+  return [member, none](const SurfacePixel& pixel) {
+    const float arrives = pixel.state.arrives.value[0];
+    return arrives > 0 ? (pixel.state.*member).value[0] / arrives : none;
+  };
+}
+
 /// Red, green and blue of a film's layer.
 Eigen::Vector3f layer_color(const Film& film, std::size_t layer, std::size_t index) {
   Eigen::Vector3f color;
@@ -49,8 +57,8 @@ ChannelTable<SurfacePixel> surface_channels(const SurfacePicture& picture, const
       {{"samples"}, [](Pixel pixel) { return pixel.state.samples; }},
       {{"variance"}, [](Pixel pixel) { return pixel.state.variance(); }}};
   if (picture.bends) {  // The camera's light.
-    table.push_back({{"gain"}, mean(&PixelState::radiance_scale)});
-    table.push_back({{"deflection"}, mean(&PixelState::deflection)});
+    table.push_back({{"gain"}, mean_of_arrived(&PixelState::radiance_scale, 1)});
+    table.push_back({{"deflection"}, mean_of_arrived(&PixelState::deflection, 0)});
     table.push_back({{"arrives"}, mean(&PixelState::arrives)});
     table.push_back({{"folds"}, mean(&PixelState::folds)});
     table.push_back({{"texture.s", "texture.t"}, mean(&PixelState::texture)});
@@ -140,6 +148,7 @@ RenderCallbacks render_callbacks(const Progress& progress, RenderJob* job, const
     else
       progress.update("rendering", done, total);
   };
+  callbacks.cancelled = &progress.cancelled;
   if (!job) return callbacks;
   callbacks.job = job;
   if (job->show)

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -70,9 +71,9 @@ Light make_light(const LightSourceDescription& light, const ShownLights& all, st
     case LightKind::environment:
       return all.environments[environments++];
     case LightKind::constant:
-      break;
+      return ConstantLight{shown.radiance(light.color, light.strength)};
   }
-  return ConstantLight{shown.radiance(light.color, light.strength)};
+  throw std::logic_error("unknown kind of light");
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const 
 }
 
 /// Power by channel and end, for a beam of irradiance 1.
-std::vector<std::array<double, ray_end_count>> beam_power(const Scene& scene, const Caustic& caustic) {
+std::vector<std::array<double, ray_end_count>> landed_power(const Scene& scene, const Caustic& caustic) {
   std::vector<std::array<double, ray_end_count>> power = caustic.power;
   for (std::size_t channel = 0; channel < power.size(); ++channel)
     for (double& each : power[channel]) each *= scene.channels[channel].power * area(scene.beam.aperture);
@@ -75,8 +75,10 @@ PlateLight draw(const Scene& scene, FlowMap map, const Sweep& sweep, Ranks* rank
   Statistics& statistics = light.render.statistics;
   statistics.seconds_density = seconds_since(start);
   statistics.positions = light.map.starts.size();
+  statistics.emitted.assign(scene.channels.size(), light.map.starts.size());
   statistics.ends = caustic.ends;
-  statistics.power = beam_power(scene, caustic);
+  statistics.power = landed_power(scene, caustic);
+  for (const LightChannel& channel : scene.channels) statistics.beam_power += channel.power * area(scene.beam.aperture);
   statistics.ray_steps = light.map.ray_steps;
   statistics.tensor_samples = light.map.tensor_samples;
   gather_counts(ranks, statistics);

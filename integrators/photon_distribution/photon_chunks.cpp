@@ -155,6 +155,7 @@ PhotonSums empty_sums(const PhotonJob& job) {
   const Eigen::Vector2i& pixels = job.geometry.surfaces().plate->resolution;
   const int channels = static_cast<int>(job.channels.size());
   PhotonSums sums;
+  sums.emitted.assign(job.channels.size(), 0);
   sums.ends.assign(job.channels.size(), EndCounts{});
   sums.density.emplace(pixels.x(), pixels.y(), channels, settings.density, settings.colors);
   sums.fluence = make_fluence(job);
@@ -198,7 +199,8 @@ void ChunkTracer::trace_task(std::size_t task, PhotonSums& sums) {
   const std::size_t rays = job_.rays_per_position, first = task * task_size;
   const std::size_t count = std::min<std::size_t>(task_size, emissions_.size() - first);
   const std::size_t batch = std::max<std::size_t>(1, rays_in_batch / rays);
-  if (worker.ends.empty()) worker.ends.assign(job_.channels.size(), EndCounts{});
+  worker.emitted.resize(job_.channels.size());
+  worker.ends.resize(job_.channels.size());
   if (job_.settings.keep_photons) photons_[task].clear();
   for (std::size_t begin = 0; begin < count; begin += batch) {
     fill_batch(first + begin, first + std::min(begin + batch, count), worker);
@@ -223,6 +225,7 @@ void ChunkTracer::fill_batch(std::size_t begin, std::size_t end, Worker& worker)
     for (int ray = 0; ray < job_.rays_per_position; ++ray) {
       const int channel = channel_of(job_, ray, emission.stratum);
       worker.channels.push_back(static_cast<std::uint16_t>(channel));
+      ++worker.emitted[static_cast<std::size_t>(channel)];
       batch.flexibility.push_back(job_.channels[channel].flexibility);
     }
   }
@@ -262,8 +265,11 @@ void ChunkTracer::take_counts(PhotonSums& sums) {
   for (Worker& worker : workers_) {
     sums.ray_steps += std::exchange(worker.ray_steps, 0);
     sums.tensor_samples += std::exchange(worker.batch.tensor_samples, 0);
-    for (std::size_t channel = 0; channel < worker.ends.size(); ++channel)
+    for (std::size_t channel = 0; channel < worker.ends.size(); ++channel) {
+      sums.emitted[channel] += worker.emitted[channel];
       for (int end = 0; end < ray_end_count; ++end) sums.ends[channel][end] += worker.ends[channel][end];
+    }
+    worker.emitted.clear();
     worker.ends.clear();
   }
 }
@@ -278,6 +284,7 @@ void copy_sums(Archive& archive, PhotonSums& sums) {
         "the photons that were kept are those of other outputs: from the beginning, ask for the same of `spectral`, "
         "`photons` and `fluence`");
   for (std::uint64_t* count : {&sums.candidates, &sums.ray_steps, &sums.tensor_samples}) archive.copy_sums(count, 1);
+  archive.copy_sums(sums.emitted.data(), sums.emitted.size());
   for (EndCounts& ends : sums.ends) archive.copy_sums(ends.data(), ends.size());
   add_fluence(archive, sums);
   add_photons(archive, sums);

@@ -62,7 +62,8 @@ struct PhotonJob {
 struct PhotonSums {
   std::uint64_t candidates = 0;  ///< Of the beam (BeamSampler), whether they emitted or not.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
-  std::vector<EndCounts> ends;              ///< By channel.
+  std::vector<std::uint64_t> emitted;       ///< Rays, by channel, ...
+  std::vector<EndCounts> ends;              ///< ... and by their ends.
   std::optional<DensityEstimator> density;  ///< The light on the plate.
   std::unique_ptr<FluenceSums> fluence;     ///< Null: not wanted.
   bool is_colored = false;                  ///< Whether the light on the plate is red, green and blue, not by channel.
@@ -94,6 +95,7 @@ class ChunkTracer {
     RayBatch batch;
     std::vector<RayRecord> records;
     std::vector<std::uint16_t> channels;  // The channel of each ray of the batch.
+    std::vector<std::uint64_t> emitted;
     std::vector<EndCounts> ends;
     std::uint64_t ray_steps = 0;
   };

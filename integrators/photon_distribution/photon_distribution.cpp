@@ -51,10 +51,10 @@ PhotonDistribution distribution_of(const PhotonJob& job, const PhotonSums& sums)
   result.ray_area = job.ray_area;
   result.ray_steps = sums.ray_steps;
   result.tensor_samples = sums.tensor_samples;
+  result.emitted = sums.emitted;
   result.ends = sums.ends;
   std::uint64_t rays = 0;
-  for (const EndCounts& ends : sums.ends)
-    for (const std::uint64_t count : ends) rays += count;
+  for (const std::uint64_t count : sums.emitted) rays += count;
   result.positions = rays / static_cast<std::uint64_t>(job.rays_per_position);
   const double area = job.ray_area / share_of(job, sums), weight = area / job.geometry.surfaces().plate->pixel_area();
   if (sums.fluence) result.fluence = sums.fluence->grids(area);

@@ -57,9 +57,11 @@ struct PhotonDistribution {
                                     ///< names. See fluence.h.
 
   std::uint64_t positions = 0;  ///< Number of positions that emitted.
-  std::vector<EndCounts> ends;  ///< One entry for each channel. Every ray of a channel has the same power, so that
-                                ///< emitted = deposited + missed + stopped holds exactly.
-  double ray_area = 0;          ///< Cross section of the beam that one ray stands for, world units².
+  /// One entry for each channel: rays, counted where they start, and where they end. Every ray of a channel has the
+  /// same power.
+  std::vector<std::uint64_t> emitted;
+  std::vector<EndCounts> ends;
+  double ray_area = 0;  ///< Cross section of the beam that one ray stands for, world units².
   std::uint64_t ray_steps = 0, tensor_samples = 0;
   double seconds_tracing = 0;  ///< From emission to the sums.
   double seconds_density = 0;  ///< From the sums to the film.

@@ -9,6 +9,7 @@
 #include "base/process/seconds.h"
 #include "integrators/photon_distribution/plate_light.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/outputs/body_outline.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
@@ -84,6 +85,7 @@ Render render_of(const Scene& scene, PlateLight light, const Progress& progress,
     result.spectral = spectral_image(light.irradiance, scene.bands, SpectralQuantity::irradiance,
                                      description.light.irradiance, to_working(scene));
   result.view = picture_view(*scene.geometry.surfaces().plate);
+  result.outline = body_outline(scene, *scene.geometry.surfaces().plate);
   if (description.output.wants(Annotation::legend)) result.draw_legend = light_legend(scene);
   name_fluence(scene, result.grids);
   if (result.statistics.error) result.metadata["tensorray:error"] = fmt::format("{:.3g}", *result.statistics.error);

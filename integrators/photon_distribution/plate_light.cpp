@@ -43,6 +43,7 @@ PlateLight light_of(const Scene& scene, PhotonDistribution traced) {
   light.render.grids = std::move(traced.fluence);
   Statistics& statistics = light.render.statistics;
   statistics.positions = traced.positions;
+  statistics.emitted = std::move(traced.emitted);
   statistics.ends = std::move(traced.ends);
   for (const LightChannel& channel : scene.channels)
     statistics.channel_power.push_back(channel.power * traced.ray_area);

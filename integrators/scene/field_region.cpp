@@ -102,6 +102,7 @@ void FieldRegion::follow(double sign, bool scales, std::vector<BentRay>& ways) c
   rays.clear();
   for (const BentRay& way : ways)
     rays.add(start_of(way), way.direction, sign * settings_.flexibility(way.band, way.place));
+  if (sign < 0) ways_ += rays.size();
   rays.wants_log_radiance_scale = true;
   rays.tensor_samples = 0;
   trace(field_, geometry_, settings_.bending, rays);

@@ -72,7 +72,8 @@ class FieldRegion final : public BendingRegion {
   std::uint64_t tensor_samples() const { return tensor_samples_; }
   std::uint64_t steps() const { return steps_; }
 
-  /// Number of ways that were followed back to this end. Interpolated ways do not count.
+  /// Number of ways that were followed back, and to this end. Interpolated ways do not count.
+  std::uint64_t ways() const { return ways_; }
   std::uint64_t ways(RayEnd end) const { return ends_[static_cast<std::size_t>(end)]; }
   /// Number of ways whose factor on radiance was above the limit.
   std::uint64_t limited() const { return limited_; }
@@ -91,7 +92,7 @@ class FieldRegion final : public BendingRegion {
   double rounding_;  ///< World units.
   mutable tbb::enumerable_thread_specific<RayBatch> memory_;
   mutable std::array<std::atomic<std::uint64_t>, ray_end_count> ends_{};
-  mutable std::atomic<std::uint64_t> limited_{0}, tensor_samples_{0}, steps_{0};
+  mutable std::atomic<std::uint64_t> limited_{0}, ways_{0}, tensor_samples_{0}, steps_{0};
 };
 
 }  // namespace tensorray

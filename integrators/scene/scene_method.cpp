@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <numeric>
 
 #include <fmt/format.h>
 
@@ -121,10 +120,11 @@ void report(const FieldRegion& region, const ObjectScene& loaded, Render& result
   Statistics& statistics = result.statistics;
   statistics.ray_steps = region.steps();
   statistics.tensor_samples = region.tensor_samples();
+  statistics.positions = region.ways();
+  statistics.emitted = {region.ways()};
   statistics.ends.assign(1, EndCounts{});
   for (int end = 0; end < ray_end_count; ++end) {
     statistics.ends[0][static_cast<std::size_t>(end)] = region.ways(static_cast<RayEnd>(end));
-    statistics.positions += region.ways(static_cast<RayEnd>(end));
   }
   if (region.limited() * 1000 > statistics.positions)
     result.warnings.push_back(
@@ -139,8 +139,8 @@ void report(const std::vector<PhotonCounts>& passes, Render& result) {
   result.statistics.scene_method->photons = passes;
   std::uint64_t stopped = 0, emitted = 0;
   for (const PhotonCounts& counts : passes) {
-    stopped += counts[static_cast<std::size_t>(PhotonEnd::stopped)];
-    emitted += std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+    stopped += counts.ends[static_cast<std::size_t>(PhotonEnd::stopped)];
+    emitted += counts.emitted;
   }
   if (stopped * 1000 > emitted)
     result.warnings.push_back(fmt::format("{:.1f}% of the photons could not be followed; the picture lacks their light",

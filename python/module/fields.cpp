@@ -21,12 +21,13 @@
 
 namespace tensorray {
 
+std::string Field::source() const { return keys_.contains("file") ? keys_["file"] : keys_["generate"]["kind"]; }
+
 LoadedField Field::loaded(const FieldChoices& choices) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!loaded_ || choices_ != choices) {
     loaded_.reset();  // Its memory is needed.
-    const std::string source = keys_.contains("file") ? keys_["file"] : keys_["generate"]["kind"];
-    loaded_ = prepare_field(blocks_, choices, source);
+    loaded_ = prepare_field(blocks_, choices, source());
     choices_ = choices;
   }
   return *loaded_;
@@ -36,11 +37,40 @@ namespace {
 
 constexpr int block_floats = 9 * TensorBlock::voxels;
 
+using Numbers = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+
+/// @param points, triangles  (n, 3); without rows: there is no surface.
+TriangleMesh surface_of_arrays(const Doubles& points, const Numbers& triangles) {
+  require(points.ndim() == 2 && points.shape(1) == 3 && triangles.ndim() == 2 && triangles.shape(1) == 3,
+          "surface: give points and triangles, arrays of the shapes (n, 3) and (m, 3)");
+  TriangleMesh surface;
+  for (py::ssize_t i = 0; i < points.shape(0); ++i) {
+    surface.vertices.emplace_back(points.data(i, 0));
+    require(surface.vertices.back().allFinite(), "surface: points must be finite");
+  }
+  for (py::ssize_t i = 0; i < triangles.size(); ++i) {
+    const std::int64_t corner = triangles.data()[i];
+    require(corner >= 0 && corner < points.shape(0), "surface: triangles have numbers of points that are not there");
+    if (i % 3 == 0) surface.triangles.emplace_back();
+    surface.triangles.back()[static_cast<std::size_t>(i % 3)] = static_cast<std::uint32_t>(corner);
+  }
+  return surface;
+}
+
+/// The points and the triangles of the field's surface.
+py::tuple surface_of(const Field& field) {
+  const TriangleMesh& surface = field.surface();
+  const auto points = static_cast<py::ssize_t>(surface.vertices.size()),
+             triangles = static_cast<py::ssize_t>(surface.triangles.size());
+  return py::make_tuple(taken_matrices(surface.vertices, {points, 3}),
+                        taken<std::array<std::uint32_t, 3>, std::uint32_t>(surface.triangles, {triangles, 3}));
+}
+
 /// A field of an array (nz, ny, nx, 3, 3) of floats or doubles with any strides. The array is not copied: the field
 /// keeps it, and reads it when its bricks are made.
 template <class Number>
 std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, const Doubles& to_world,
-                                      const std::string& text) {
+                                      const std::string& text, const Doubles& points, const Numbers& triangles) {
   require(tensors.ndim() == 5 && tensors.shape(3) == 3 && tensors.shape(4) == 3,
           "the tensors must be an array of shape (nz, ny, nx, 3, 3)");
   require(tensors.size() > 0, "the array of tensors is empty");
@@ -67,6 +97,7 @@ std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, con
   BlockSource blocks = dense_source({Eigen::Vector3i::Zero(), size - Eigen::Vector3i::Ones()}, transform, tensor);
   Json keys = parse_value(text);
   blocks.name = keys.value("name", blocks.name);
+  blocks.surface = surface_of_arrays(points, triangles);
   return std::make_shared<Field>(std::move(keys), std::move(blocks), tensors);
 }
 
@@ -131,6 +162,8 @@ void copy_grid(TensorGrid& grid, Archive& archive) {
   archive.copy_list(grid.name);
   archive.copy(grid.to_world.data(), sizeof grid.to_world.matrix());
   archive.copy_list(metadata);
+  archive.copy_list(grid.surface.vertices);
+  archive.copy_list(grid.surface.triangles);
   archive.copy(count);
   if (archive.reads()) {
     grid.metadata = parse_value(metadata).get<std::map<std::string, std::string>>();
@@ -200,6 +233,7 @@ void add_fields(py::module_& module) {
   module.def("make_field", &make_field);
   module.def("write_field", &write_field);
   module.def("tensors_of", &tensors_of);
+  module.def("surface_of", &surface_of);
   module.def("voxels_of", &voxels_of);
   module.def("field_of_voxels", &field_of_voxels);
   module.def("invariant", &invariant_of_field);

@@ -33,7 +33,9 @@ class Field {
       : keys_(std::move(keys)), blocks_(std::move(blocks)), memory_(std::move(memory)) {}
 
   const Json& keys() const { return keys_; }
+  std::string source() const;  ///< Names the field in notes and errors.
   TensorGrid grid() const { return to_grid(blocks_); }
+  const TriangleMesh& surface() const { return blocks_.surface; }
 
   /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if a choice differs from the
   /// last one.

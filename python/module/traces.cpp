@@ -31,7 +31,7 @@ struct TraceRequest {
   Doubles positions, directions, flexibilities;  ///< (n, 3), (n, 3) unit, (n).
   std::optional<Doubles> along, turning;         ///< (n, 3, 2): derivatives of the starts.
   std::optional<Plate> plate;
-  std::string eigenvalues, interpolation, border;
+  std::string eigenvalues, interpolation, border, bounds;
   double smooth;  ///< Voxels.
   std::string method;
   double scale, step;
@@ -152,16 +152,20 @@ py::dict trace_for_python(const Field& field, const TraceRequest& request, int t
   bending.step = request.step;
   bending.max_steps = request.max_steps;
   bending.max_length = request.max_length;
-  const bool extends = value_of<BorderChoice>("border", request.border) == BorderChoice::extend;
-  const FieldChoices choices{
-      request.smooth,
-      value_of<Eigenvalues>("eigenvalues", request.eigenvalues),
-      {value_of<Interpolation>("interpolation", request.interpolation), extends ? Border::extend : Border::fade}};
+  const auto border = value_of<BorderChoice>("border", request.border);
+  FieldChoices choices;
+  choices.smoothing = request.smooth;
+  choices.eigenvalues = value_of<Eigenvalues>("eigenvalues", request.eigenvalues);
+  choices.interpolant = {value_of<Interpolation>("interpolation", request.interpolation),
+                         border == BorderChoice::extend ? Border::extend : Border::fade};
+  choices.keeps_surface = value_of<BoundsChoice>("bounds", request.bounds) == BoundsChoice::automatic;
+  choices.at_surface = border == BorderChoice::fade ? Border::fade : Border::extend;
   run(report, threads, [&](const Progress& progress) {
     progress.update("loading", 0, 1);
     const TensorField bricks = field.loaded(choices).field;
     Surfaces surfaces;
     surfaces.bounds = box_mesh(bricks.index_bounds(), bricks.to_world());
+    if (!bricks.surface().triangles.empty()) surfaces.cut = closed_surface(bricks.surface(), field.source());
     surfaces.plate = request.plate;
     progress.update("tracing", 0, 1);
     trace_all(bricks, Geometry(std::move(surfaces)), bending, request.paths, batches, progress);
@@ -254,7 +258,8 @@ void add_traces(py::module_& module) {
   py::class_<Plate>(module, "Plate").def(py::init(&plate_of));
   py::class_<TraceRequest>(module, "TraceRequest")
       .def(py::init<Doubles, Doubles, Doubles, std::optional<Doubles>, std::optional<Doubles>, std::optional<Plate>,
-                    std::string, std::string, std::string, double, std::string, double, double, int, double, bool>());
+                    std::string, std::string, std::string, std::string, double, std::string, double, double, int,
+                    double, bool>());
   module.def("trace", &trace_for_python);
   module.def("landings", &landings);
   std::vector<std::string> ends;

@@ -30,12 +30,16 @@ class Field:
     origin      Centre of the voxel T[0, 0, 0], world (x, y, z).
     to_world    Instead of these two: a (4, 4) matrix from voxel indices (i, j, k, 1) to the world.
     name        Name of the field in files.
+    surface     Surface of the body that the field is in, which light bends in alone: points (n, 3), world, and
+                triangles (m, 3), numbers of points, counter-clockwise from outside; closed. None: there is no body.
 
-    The volume reaches from the first to the last voxel's centre along each axis; light is straight outside it.
+    The volume reaches from the first to the last voxel's centre along each axis, and up to two voxels further to the
+    surface; light is straight outside it.
     """
 
     def __init__(self, T: ArrayLike, voxel_size: ArrayLike = 1.0, origin: ArrayLike = (0.0, 0.0, 0.0), *,
-                 to_world: ArrayLike | None = None, name: str = "tensor") -> None:
+                 to_world: ArrayLike | None = None, name: str = "tensor",
+                 surface: tuple[ArrayLike, ArrayLike] | None = None) -> None:
         if np.ma.isMaskedArray(T):
             T = T.astype(np.result_type(T.dtype, np.float32)).filled(np.nan)
         tensors = np.asarray(T)
@@ -48,7 +52,9 @@ class Field:
         if to_world.shape != (4, 4):
             raise ValueError("to_world must be an array of shape (4, 4)")
         make_field = _tensorray.field_of_floats if tensors.dtype == np.float32 else _tensorray.field_of_doubles
-        self._field, self._keys = make_field(tensors, to_world, json_of({"file": "array", "name": name})), None
+        points, triangles = (np.empty((0, 3)), np.empty((0, 3), int)) if surface is None else map(np.asarray, surface)
+        self._field = make_field(tensors, to_world, json_of({"file": "array", "name": name}), points, triangles)
+        self._keys = None
         self._set(tensors, to_world, name, {})
 
     @classmethod
@@ -85,6 +91,13 @@ class Field:
         return dict(self._metadata)
 
     @property
+    def surface(self) -> tuple[NDArray[np.float64], NDArray[np.uint32]] | None:
+        """Points (n, 3), world, and triangles (m, 3) of the surface of the body that the field is in; None: it has
+        none."""
+        points, triangles = _tensorray.surface_of(self._field)
+        return (points, triangles) if len(triangles) else None
+
+    @property
     def bounds(self) -> NDArray[np.float64]:
         """The least and the greatest corner of the volume's axis-aligned box, world; shape (2, 3)."""
         size = np.array(self._tensors.shape[2::-1], float) - 1
@@ -103,7 +116,8 @@ class Field:
     def __reduce__(self):
         """For pickle: other processes get the same bits. (A file would round the transform.)"""
         if self._keys is None:
-            return functools.partial(Field, to_world=self._to_world, name=self._name), (self._tensors,)
+            return functools.partial(Field, to_world=self._to_world, name=self._name,
+                                     surface=self.surface), (self._tensors,)
         return _of_voxels, (self._keys, _tensorray.voxels_of(self._field))
 
     def __repr__(self):

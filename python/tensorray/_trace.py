@@ -53,7 +53,8 @@ def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLik
           turning: ArrayLike | None = None, ways: bool = False, method: Method = "auto", step: float | None = None,
           max_steps: int = 20000, max_length: float | None = None, eigenvalues: Eigenvalues = "auto",
           smooth: float = 0.0, interpolation: Literal["cubic", "linear"] = "cubic",
-          border: Literal["fade", "extend"] = "fade", threads: int = 0, progress: Progress = None) -> Trace:
+          border: Literal["auto", "fade", "extend"] = "auto", bounds: Literal["auto", "none"] = "auto",
+          threads: int = 0, progress: Progress = None) -> Trace:
     """Follows single rays through a field.
 
     positions    Starts, world: (n, 3), or (3,) for one ray or for all.
@@ -73,7 +74,9 @@ def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLik
     smooth       Standard deviation of a Gaussian that smooths the field first, voxels; 0: none.
     interpolation
                  What the field is between its voxels: cubic (smooth) or linear.
-    border       cubic: whether inactive voxels fade to zero or extend the values of active ones.
+    border       cubic: whether inactive voxels fade to zero or extend the values of active ones; auto extends them
+                 where the field has a surface.
+    bounds       auto: light is straight outside the field's surface, if it has one; none: outside the box alone.
     threads      Greatest number of threads; 0: all. The result does not depend on it.
 
     Returns a Trace. The light of a small area about a start fills |J0 x J1| times that area on the plate, where J0, J1
@@ -87,8 +90,8 @@ def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLik
         plate = _tensorray.Plate(*(np.asarray(part, float).ravel() for part in
                                    (plate.center, plate.normal, plate.up, plate.size)))
     request = _tensorray.TraceRequest(
-        starts, headings, flexibilities, along, turning, plate, eigenvalues, interpolation, border, float(smooth),
-        method, float(scale), float(step or 0), int(max_steps),
+        starts, headings, flexibilities, along, turning, plate, eigenvalues, interpolation, border, bounds,
+        float(smooth), method, float(scale), float(step or 0), int(max_steps),
         math.inf if max_length is None else float(max_length), ways)
     with shown(progress) as report:
         return Trace(**_tensorray.trace(module_field("trace", field), request, threads, report), along=along)

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -184,6 +185,7 @@ class Rendering {
     const int columns = (width_ + step - 1) / step, rows = (height_ + step - 1) / step;
     std::vector<double> luminances(static_cast<std::size_t>(columns) * rows);
     tbb::parallel_for(0, rows, [&](int row) {
+      if (is_cancelled()) return;
       Batch batch(scene_, settings_.shading);
       for (int column = 0; column < columns; ++column) add_ray(column * step, row * step, 0, batch);
       batch.shader.shade(batch.rays, !settings_.transparent);
@@ -235,18 +237,17 @@ class Rendering {
     const auto caller = std::this_thread::get_id();
     std::vector<char> is_extended(lists_.wanted.size()), is_done(lists_.wanted.size());
     tbb::parallel_for(std::size_t{0}, lists_.wanted.size(), [&](std::size_t i) {
-      if (job_.stopping || is_round_over()) return;
+      if (job_.stopping || is_cancelled() || is_round_over()) return;
       Batch batch(scene_, settings_.shading);
-      is_done[i] = extend(lists_.wanted[i], batch) ? 1 : 0;
+      const std::optional<bool> done = extend(lists_.wanted[i], batch);
+      if (!done) return;
+      is_done[i] = *done ? 1 : 0;
       is_extended[i] = 1;
       if (std::this_thread::get_id() != caller) return;
-      if (callbacks_.progress) {
-        const auto by_time =
-            static_cast<std::uint64_t>(std::min(1.0, time_used()) * static_cast<double>(total_samples_));
-        callbacks_.progress(std::max(finished_samples_.load(), by_time), total_samples_);
-      }
+      report();
       if (callbacks_.show && is_root(job_.ranks) && job_.picture_wanted.exchange(false)) callbacks_.show(picture());
     });
+    if (is_cancelled()) report();
     // Those that had no turn are the first of the next pass.
     std::vector<std::size_t> next[2];
     for (std::size_t i = 0; i < lists_.wanted.size(); ++i) {
@@ -257,8 +258,17 @@ class Rendering {
     lists_.wanted.insert(lists_.wanted.end(), next[1].begin(), next[1].end());
   }
 
-  /// @return whether the tile is done.
-  bool extend(std::size_t number, Batch& batch) {
+  bool is_cancelled() const { return callbacks_.cancelled && *callbacks_.cancelled; }
+
+  /// On the thread that called `render_surfaces`.
+  void report() const {
+    if (!callbacks_.progress) return;
+    const auto by_time = static_cast<std::uint64_t>(std::min(1.0, time_used()) * static_cast<double>(total_samples_));
+    callbacks_.progress(std::max(finished_samples_.load(), by_time), total_samples_);
+  }
+
+  /// @return whether the tile is done; nothing if the render is cancelled: the tile stays as it was.
+  std::optional<bool> extend(std::size_t number, Batch& batch) {
     Tile tile = load(number);
     const int before = tile.samples(), more = next_samples(before), after = before + more;
     const std::size_t batch_samples = scene_.region ? bent_batch : straight_batch;
@@ -267,7 +277,9 @@ class Rendering {
         if (tile.pixel(x, y).done != 0) continue;
         for (int sample = before; sample < after; ++sample) {
           add_ray(tile.left + x, tile.top + y, sample, batch);
-          if (batch.rays.size() == batch_samples) shade(tile, before, after, batch);
+          if (batch.rays.size() < batch_samples) continue;
+          if (is_cancelled()) return std::nullopt;
+          shade(tile, before, after, batch);
         }
       }
     shade(tile, before, after, batch);

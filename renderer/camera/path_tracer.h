@@ -2,6 +2,7 @@
 /// @file renderer/camera/path_tracer.h
 /// Renders pictures of surfaces by path tracing.
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -78,7 +79,8 @@ struct PixelState {
   // Of those that hit a surface with this attribute.
   PixelMean<1> force, arc_length;
 
-  // If light bends. See BentView, of the samples that enter the region; 1, 0 and 1 where none does.
+  // If light bends. See BentView, of the samples that enter the region (divide the first two by `arrives`); 1, 0 and 1
+  // where none does.
   PixelMean<1> radiance_scale{{1}}, deflection, arrives{{1}};
   PixelMean<2> texture;  ///< Place in the texture of a plate: 0, 0 is its lower left, 1, 1 its upper right corner.
   PixelMean<1> folds;    ///< Sheets of landed light, of a plate on which it has landed.
@@ -109,6 +111,9 @@ struct RenderCallbacks {
   /// Called from time to time, on the thread that called `render_surfaces`. `total` is the number of samples if no
   /// pixel stops early. May be empty. An exception that it throws ends the render and reaches the caller.
   std::function<void(std::uint64_t done, std::uint64_t total)> progress;
+
+  /// Whether what is being rendered is given up: `progress` is called soon, and throws or stops the job. May be null.
+  const std::atomic<bool>* cancelled = nullptr;
 
   /// Keeps the tiles of the picture, its units, as "tile" and a number; null: they are not needed. Only tiles of its
   /// part are rendered, and only until it is stopping: others of the result are black, with 0 samples. What is kept of

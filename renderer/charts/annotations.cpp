@@ -93,6 +93,21 @@ std::vector<Mark> axis_marks(int axis, const Vector3d& direction, const Sizes& s
   return {{-a, a, "", sizes.line}, {-b, b, "", sizes.line}, letter};
 }
 
+/// The dashes of a stroke. They follow the picture's columns or rows, so that those of its neighbours go on.
+void add_dashes(const OutlineStroke& stroke, double dash, double width, std::vector<Mark>& marks) {
+  const Vector2d way = stroke.to - stroke.from;
+  const int axis = std::abs(way.x()) > std::abs(way.y()) ? 0 : 1;
+  const double first = std::min(stroke.from[axis], stroke.to[axis]),
+               last = std::max(stroke.from[axis], stroke.to[axis]);
+  for (double i = std::floor(first / (2 * dash)); 2 * i * dash < last; ++i) {
+    const double begin = std::max(2 * i * dash, first), end = std::min((2 * i + 1) * dash, last);
+    const auto at = [&](double place) -> Vector2d {
+      return stroke.from + (place - stroke.from[axis]) / way[axis] * way;
+    };
+    if (begin < end) marks.push_back({at(begin), at(end), "", width});
+  }
+}
+
 }  // namespace
 
 double round_length(double limit) {
@@ -137,6 +152,17 @@ void draw_axes(Image& image, const Vector3d& right, const Vector3d& up) {
     for (Mark& mark : axis_marks(axis, {right[axis], up[axis], towards[axis]}, sizes)) marks.push_back(std::move(mark));
   shift(Vector2d::Constant(sizes.margin) - extent_of(marks).min(), marks);
   draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
+}
+
+void draw_outline(Image& image, const std::vector<OutlineStroke>& strokes, bool visible, bool hidden) {
+  const Sizes sizes(image);
+  std::vector<Mark> marks;
+  for (const OutlineStroke& stroke : strokes)
+    if (stroke.is_hidden && hidden)
+      add_dashes(stroke, sizes.letter / 2, sizes.line / 2, marks);
+    else if (!stroke.is_hidden && visible)
+      marks.push_back({stroke.from, stroke.to, "", sizes.line});
+  if (!marks.empty()) draw_marks(image, marks, sizes.outline / 2, is_light(image, extent_of(marks)));
 }
 
 void draw_color_strip(Image& image, const ColorStrip& strip) {

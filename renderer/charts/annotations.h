@@ -1,10 +1,11 @@
 #pragma once
 /// @file renderer/charts/annotations.h
 /// Small drawings in the corners of a picture that say how to read it: a scale bar, a caption, the axes of the
-/// world, a strip of colours.
+/// world, a strip of colours. And the lines of bodies over it.
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -41,5 +42,14 @@ struct ColorStrip {
 
 /// Draws it in the upper right corner.
 void draw_color_strip(Image& image, const ColorStrip& strip);
+
+/// A straight part of a line of a body, in pixels.
+struct OutlineStroke {
+  Eigen::Vector2d from, to;
+  bool is_hidden = false;
+};
+
+/// Draws the lines that are visible, those that are hidden (thinner, and dashed), or both.
+void draw_outline(Image& image, const std::vector<OutlineStroke>& strokes, bool visible, bool hidden);
 
 }  // namespace tensorray

@@ -202,6 +202,7 @@ NativeImage read_native_image(const std::filesystem::path& path, const std::stri
 }
 
 void add_notes(const std::filesystem::path& path, const NativeImage& image, std::vector<std::string>& notes) {
+  if (!image.choice.empty()) notes.push_back(path.string() + ": " + image.choice);
   if (image.non_finite > 0)
     notes.push_back("warning: " + path.string() + ": " + std::to_string(image.non_finite) +
                     " pixels have values that are not finite; these count as 0");

@@ -105,21 +105,23 @@ struct NativeImage {
   int alpha = -1;                 ///< Index of alpha; -1: none.
   bool is_premultiplied = false;  ///< Whether the colours are multiplied by alpha.
   ColorTags tags;
+  std::string choice;                   ///< Which part or layer was taken, if that is not evident.
   std::size_t non_finite = 0;           ///< Pixels with a value that is not finite, which counts as 0.
   std::shared_ptr<const void> samples;  ///< data_width * data_height * channels values, rows from the top.
 };
 
 /// Reads a picture as its file stores it: integers of up to 8 bits as uint8, of up to 16 bits as uint16, everything
 /// else as floats. It is turned as the file's orientation says (Exif, TIFF). Channels are found by name: R, G, B
-/// (without a layer's name, or else of the first layer that has them); Y, or a single channel of any name, for grey;
-/// and A. Of EXR as luminance and chroma, R, G and B are computed.
+/// (without a layer's name, or else of the first layer that has them), or Nuke's red, green, blue; Y, or a single
+/// channel of any name, for grey; and A. Of an EXR with several parts, the first one that has colours counts. Of EXR as
+/// luminance and chroma, R, G and B are computed.
 /// @param layer  Only the channels LAYER.R, ... count, the channel LAYER for grey, or the part of the file with this
 ///               name. Empty: any.
 /// @throw std::runtime_error naming the file and the reason; also if the file is cut off, has no such channels, or its
 /// values take more than 8 GiB.
 NativeImage read_native_image(const std::filesystem::path& path, const std::string& layer = "");
 
-/// Adds a warning to `notes` if the picture has pixels that are not finite.
+/// Adds to `notes` which part or layer was taken, and a warning if the picture has pixels that are not finite.
 void add_notes(const std::filesystem::path& path, const NativeImage& image, std::vector<std::string>& notes);
 
 /// Converts a picture in memory without a copy. @throw std::invalid_argument unless the channels are R, G, B or R, G,

@@ -7,6 +7,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double rounding = 1e-3;  // Pixels by which a point of the surface may lie beside its plate.
+
 /// The place of a point of the surface on the plate.
 Vector3d place_of(const IrradianceMap& light, const Vector3d& point) {
   if (!light.body || !light.source) return point;  // Pixels are those of the point's projection along the normal.
@@ -30,10 +32,10 @@ bool is_lit(const IrradianceMap& light, const Vector3d& point, const Vector3d& r
 
 void add_irradiance(const IrradianceMap& light, const Vector3d& point, Eigen::ArrayXd& sum, Eigen::Index first_band) {
   const Vector3d place = place_of(light, point);
-  const Eigen::Vector2d at = light.plate.to_pixel(place) - Eigen::Vector2d(0.5, 0.5);
-  const Eigen::Vector2i& size = light.plate.resolution;
-  if (!((at.array() > -1).all() && (at.array() < size.cast<double>().array()).all())) return;
-  const Eigen::Vector2d corner = at.array().floor(), part = at - corner;
+  const Eigen::Array2d at = light.plate.to_pixel(place), size = light.plate.resolution.cast<double>();
+  if (!((at > -rounding).all() && (at < size + rounding).all())) return;
+  // Beyond the centres of the outermost pixels, these alone count.
+  const Eigen::Array2d between = (at - 0.5).max(0).min(size - 1), corner = between.floor(), part = between - corner;
   double radiance_scale = 1;
   if (light.body && light.source) {  // From the plate to a surface at the point that faces the light.
     const Vector3d to_plate = place - *light.source;
@@ -44,8 +46,8 @@ void add_irradiance(const IrradianceMap& light, const Vector3d& point, Eigen::Ar
     for (int i = 0; i < 2; ++i) {
       const int x = static_cast<int>(corner.x()) + i, y = static_cast<int>(corner.y()) + j;
       const double weight = (i == 1 ? part.x() : 1 - part.x()) * (j == 1 ? part.y() : 1 - part.y());
-      if (!(weight > 0) || x < 0 || y < 0 || x >= size.x() || y >= size.y()) continue;
-      const Eigen::Index pixel = static_cast<Eigen::Index>(y) * size.x() + x;
+      if (!(weight > 0)) continue;
+      const Eigen::Index pixel = static_cast<Eigen::Index>(y) * light.plate.resolution.x() + x;
       const float* const irradiance = light.irradiance.data() + pixel * light.bands + first_band;
       sum += radiance_scale * weight * Eigen::Map<const Eigen::ArrayXf>(irradiance, sum.size()).cast<double>();
     }

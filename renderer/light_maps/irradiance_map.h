@@ -42,8 +42,9 @@ bool is_lit(const IrradianceMap& light, const Eigen::Vector3d& point, const Eige
 /// The number of sheets at a point of the surface; 0 where there is no light.
 float folds_at(const IrradianceMap& light, const Eigen::Vector3d& point);
 
-/// Adds the irradiance of the plate at a point of the surface to `sum`, with linear interpolation between pixels. On a
-/// body it is that of a surface that faces the light. @param sum  Of the bands from `first_band` on.
+/// Adds the irradiance of the plate at a point of the surface to `sum`, with linear interpolation between pixels; up to
+/// the plate's edge, its outermost pixels go on. On a body it is that of a surface that faces the light.
+/// @param sum  Of the bands from `first_band` on.
 void add_irradiance(const IrradianceMap& light, const Eigen::Vector3d& point, Eigen::ArrayXd& sum,
                     Eigen::Index first_band = 0);
 

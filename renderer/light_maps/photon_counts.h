@@ -3,6 +3,7 @@
 /// Numbers of photons of a path tracer's lights, by where they went.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace tensorray {
@@ -12,7 +13,17 @@ namespace tensorray {
 enum class PhotonEnd { before, landed, escaped, stopped };
 constexpr int photon_end_count = 4;
 
-/// Photons by their end; their sum is the number of those that were emitted.
-using PhotonCounts = std::array<std::uint64_t, photon_end_count>;
+/// Photons that were emitted, counted there, and by their end, counted there: the sums are the same.
+struct PhotonCounts {
+  std::uint64_t emitted = 0;
+  std::array<std::uint64_t, photon_end_count> ends{};
+
+  PhotonCounts& operator+=(const PhotonCounts& more) {
+    emitted += more.emitted;
+    for (std::size_t end = 0; end < ends.size(); ++end) ends[end] += more.ends[end];
+    return *this;
+  }
+  bool operator==(const PhotonCounts& other) const { return emitted == other.emitted && ends == other.ends; }
+};
 
 }  // namespace tensorray

@@ -96,18 +96,21 @@ void add_mirrored(const Photon& photon, const Plate& plate, double radius, std::
 class PhotonTracer {
  public:
   PhotonTracer(const BendingRegion& region, const SurfaceScene& surfaces, const PhotonTracerSettings& settings,
-               int pass)
+               const Progress& progress, int pass)
       : region_(region),
         surfaces_(surfaces),
         settings_(settings),
+        progress_(progress),
         pass_(pass),
         radius_(photon_radius(settings.radius, pass)) {}
 
   ChunkPhotons trace(const Source& source, const Chunk& chunk) const {
     ChunkPhotons result;
     const std::uint64_t stream = static_cast<std::uint64_t>(source.light) * settings_.passes + pass_;
-    for (std::uint64_t i = chunk.first; i < chunk.last; ++i)
+    for (std::uint64_t i = chunk.first; i < chunk.last; ++i) {
+      if (progress_.cancelled) throw Cancelled();
       trace(source, {settings_.seed ^ photon_seed, stream, static_cast<std::uint32_t>(i), 0}, result);
+    }
     return result;
   }
 
@@ -125,16 +128,17 @@ class PhotonTracer {
       ray.band = static_cast<int>(band);
       if ((*source.strength)[band] > 0) rays.push_back(ray);
     }
+    result.counts.emitted += rays.size();
     const auto hit = surfaces_.intersect(photon.origin, photon.direction);
     const double entry = region_.entry(photon.origin, photon.direction);
     const bool enters = entry < (hit ? hit->distance : std::numeric_limits<double>::infinity());
     if (!enters || !(photon.power > 0)) {  // Without power it is from the side of an area light that does not emit.
       const PhotonEnd end = hit && !enters ? PhotonEnd::before : PhotonEnd::escaped;
-      result.counts[static_cast<std::size_t>(end)] += rays.size();
+      result.counts.ends[static_cast<std::size_t>(end)] += rays.size();
       return;
     }
     region_.trace_importance(rays);
-    for (const BentRay& each : rays) ++result.counts[static_cast<std::size_t>(land(source, each, photon, result))];
+    for (const BentRay& each : rays) ++result.counts.ends[static_cast<std::size_t>(land(source, each, photon, result))];
   }
 
   PhotonEnd land(const Source& source, const BentRay& ray, const EmittedPhoton& emitted, ChunkPhotons& result) const {
@@ -162,6 +166,7 @@ class PhotonTracer {
   const BendingRegion& region_;
   const SurfaceScene& surfaces_;
   const PhotonTracerSettings& settings_;
+  const Progress& progress_;
   int pass_;
   double radius_;
 };
@@ -189,7 +194,7 @@ PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Vector3d
   result.areas = areas_of(sources, lights, surfaces, settings);
   const std::vector<Chunk> chunks = chunks_of(sources);
   for (int pass = 0; pass < settings.passes; ++pass) {
-    const PhotonTracer tracer(region, surfaces, settings, pass);
+    const PhotonTracer tracer(region, surfaces, settings, progress, pass);
     std::vector<ChunkPhotons> parts(chunks.size());
     Units units;
     units.count = chunks.size();
@@ -211,7 +216,7 @@ PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Vector3d
     result.counts.push_back({});
     for (const ChunkPhotons& part : parts) {
       landed.insert(landed.end(), part.landed.begin(), part.landed.end());
-      for (std::size_t end = 0; end < part.counts.size(); ++end) result.counts.back()[end] += part.counts[end];
+      result.counts.back() += part.counts;
     }
     result.passes.emplace_back(std::move(landed), tracer.radius());
   }

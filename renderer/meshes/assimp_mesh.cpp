@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -15,11 +16,13 @@
 #include <assimp/DefaultLogger.hpp>
 #include <assimp/Importer.hpp>
 #include <assimp/LogStream.hpp>
+#include <assimp/MemoryIOWrapper.h>
 #include <assimp/scene.h>
 #include <unistd.h>
 
 #include "base/process/child_program.h"
 #include "base/text/text.h"
+#include "renderer/meshes/gltf.h"
 #include "renderer/meshes/mesh_readers.h"
 
 namespace tensorray {
@@ -117,16 +120,28 @@ Eigen::Affine3d to_world(const aiScene& scene, const std::string& ending) {
   return Eigen::Affine3d(turn);
 }
 
-/// Opens files only, so that no pipe or device that a file names is waited for.
+/// Opens files only, so that no pipe or device that a file names is waited for; and files in memory, by their names.
 class FilesOnly : public Assimp::DefaultIOSystem {
  public:
+  explicit FilesOnly(std::map<std::string, std::string> in_memory) : in_memory_(std::move(in_memory)) {}
+
   Assimp::IOStream* Open(const char* name, const char* mode) override {
+    if (const auto found = find(name); found != in_memory_.end())
+      return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(found->second.data()),
+                                        found->second.size());
     return Exists(name) ? Assimp::DefaultIOSystem::Open(name, mode) : nullptr;
   }
   bool Exists(const char* name) const override {
     std::error_code none;
-    return std::filesystem::is_regular_file(name, none);
+    return find(name) != in_memory_.end() || std::filesystem::is_regular_file(name, none);
   }
+
+ private:
+  std::map<std::string, std::string>::const_iterator find(const std::filesystem::path& path) const {
+    return in_memory_.find(path.filename().string());
+  }
+
+  std::map<std::string, std::string> in_memory_;
 };
 
 /// Where a face names a vertex that is not there, some readers take another one, and only log it.
@@ -154,14 +169,18 @@ class IndexErrors : public Assimp::LogStream {
 
 /// Uses none of assimp's processing steps, since they abort the program on unexpected input.
 MeshWithNormals import(const std::filesystem::path& path) {
+  const std::string ending = lower_case_ending(path);
+  const auto in_memory =
+      ending == ".gltf" || ending == ".glb" ? gltf_in_memory(path) : std::map<std::string, std::string>();
   Assimp::Importer importer;
-  importer.SetIOHandler(new FilesOnly);  // The importer deletes it.
-  const aiScene* scene = importer.ReadFile(path.string(), 0);
+  importer.SetIOHandler(new FilesOnly(in_memory));  // The importer deletes it.
+  const aiScene* scene =
+      importer.ReadFile((in_memory.empty() ? path : path.parent_path() / gltf_in_memory_name).string(), 0);
   const std::string error = importer.GetErrorString();
   if (error.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
   if (!scene) throw std::runtime_error(one_line(error));
   MeshWithNormals mesh;
-  if (scene->mRootNode) add_node(*scene, *scene->mRootNode, to_world(*scene, lower_case_ending(path)), mesh);
+  if (scene->mRootNode) add_node(*scene, *scene->mRootNode, to_world(*scene, ending), mesh);
   return mesh;
 }
 

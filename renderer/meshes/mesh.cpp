@@ -118,17 +118,6 @@ std::size_t open_edges(const TriangleMesh& mesh) {
   return open.size();
 }
 
-/// Six times the enclosed volume; positive if the triangles face outwards.
-double signed_volume(const TriangleMesh& mesh) {
-  const Eigen::Vector3d center = mesh.bounds().center();  // Coordinates relative to the centre avoid cancellation.
-  double sum = 0;
-  for (const Triangle& t : mesh.triangles) {
-    const Eigen::Vector3d a = mesh.vertices[t[0]] - center, b = mesh.vertices[t[1]] - center;
-    sum += a.dot(b.cross(mesh.vertices[t[2]] - center));
-  }
-  return sum;
-}
-
 void turn_round(TriangleMesh& mesh) {
   for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
 }
@@ -213,7 +202,7 @@ void require_closed(TriangleMesh& mesh) {
   if (const std::size_t open = open_edges(mesh))
     throw std::invalid_argument("the mesh is not closed: it has " + std::to_string(open) +
                                 " open edges, or triangles that look to different sides");
-  const double volume = signed_volume(mesh);
+  const double volume = 6 * mesh.volume();
   if (!(std::abs(volume) > 1e-12 * std::pow(mesh.bounds().diagonal().norm(), 3)))
     throw std::invalid_argument("the mesh encloses no volume");
   if (volume < 0) turn_round(mesh);

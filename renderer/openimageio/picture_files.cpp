@@ -52,6 +52,7 @@ OIIO::ImageSpec make_spec(const Image& image, const PictureFormat& format, const
 }
 
 bool is_tiff(const OIIO::ImageInput& input) { return std::strcmp(input.format_name(), "tiff") == 0; }
+bool is_exr(const OIIO::ImageInput& input) { return std::strcmp(input.format_name(), "openexr") == 0; }
 
 /// A tile may be larger than its picture, but memory is reserved for all of it before the file is found to be shorter.
 /// Lines are counted from a place that the file sets.
@@ -102,13 +103,18 @@ int find_channel(const OIIO::ImageSpec& spec, const std::string& name) {
   return -1;
 }
 
+/// Finds the colours of a layer, by the names of the format or by Nuke's.
 bool find_rgb_of(const OIIO::ImageSpec& spec, const std::string& prefix, NativeImage& image) {
-  const std::array<int, 3> rgb{find_channel(spec, prefix + "R"), find_channel(spec, prefix + "G"),
-                               find_channel(spec, prefix + "B")};
-  if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) return false;
-  image.rgb = rgb;
-  image.alpha = find_channel(spec, prefix + "A");
-  return true;
+  for (const auto& [red, green, blue, alpha] :
+       {std::array{"R", "G", "B", "A"}, std::array{"red", "green", "blue", "alpha"}}) {
+    const std::array<int, 3> rgb{find_channel(spec, prefix + red), find_channel(spec, prefix + green),
+                                 find_channel(spec, prefix + blue)};
+    if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) continue;
+    image.rgb = rgb;
+    image.alpha = find_channel(spec, prefix + alpha);
+    return true;
+  }
+  return false;
 }
 
 /// The names before the last point of the channels' names, with the point; also of channels without a point.
@@ -154,23 +160,61 @@ bool find_layer(const OIIO::ImageSpec& spec, const std::string& layer, NativeIma
   return grey >= 0;
 }
 
-[[noreturn]] void throw_no_layer(OIIO::ImageInput& input, const std::string& layer) {
+/// The names of the parts, and of the layers of channels in them.
+std::vector<std::string> layers_of(OIIO::ImageInput& input) {
   std::vector<std::string> known;
   for (int part = 0; input.seek_subimage(part, 0); ++part) {
     if (!part_name(input.spec()).empty()) known.push_back(part_name(input.spec()));
     for (const std::string& prefix : prefixes(input.spec()))
       if (!prefix.empty()) known.push_back(prefix.substr(0, prefix.size() - 1));
   }
+  return known;
+}
+
+[[noreturn]] void throw_no_layer(OIIO::ImageInput& input, const std::string& layer) {
+  const std::vector<std::string> known = layers_of(input);
   throw std::runtime_error("it has no layer \"" + layer +
                            "\"; its layers: " + (known.empty() ? "none" : joined(known)));
 }
 
-/// Finds the channels in the first part of the file, or those of a layer in any part. @return the part.
+/// Says which part or layer was taken, unless it is the first part's without a layer, and no other part has such ones.
+void say_choice(OIIO::ImageInput& input, int part, NativeImage& image) {
+  const std::vector<std::string> known = layers_of(input);
+  int plain = 0;
+  for (NativeImage other; input.seek_subimage(plain, 0) && find_rgb_of(input.spec(), "", other);) ++plain;
+  const OIIO::ImageSpec spec = input.spec(part, 0);
+  const std::string channel = spec.channelnames[static_cast<std::size_t>(image.rgb[0])], name = part_name(spec);
+  const std::size_t point = channel.rfind('.');
+  if (known.size() < 2 || (part == 0 && point == std::string::npos && plain < 2)) return;
+  image.choice = std::string(image.rgb[0] == image.rgb[1] ? "its grey is" : "its colours are") + " taken from " +
+                 (point != std::string::npos ? "the layer \"" + channel.substr(0, point) : "the part \"" + name) +
+                 "\"; its layers: " + joined(known);
+}
+
+/// Finds colours in the first part of a file, or of an EXR in the first part that has some: without a layer's name, or
+/// else of a layer. Grey is taken if there are no colours, by its name before any single channel (depth). @return the
+/// part.
+int find_colors(OIIO::ImageInput& input, NativeImage& image) {
+  const auto find_plain = [](const OIIO::ImageSpec& spec, NativeImage& found) { return find_rgb_of(spec, "", found); };
+  const auto find_y = [](const OIIO::ImageSpec& spec, NativeImage& found) {
+    return find_channel(spec, "Y") >= 0 && find_grey(spec, found);
+  };
+  using Find = bool (*)(const OIIO::ImageSpec&, NativeImage&);
+  const bool has_parts = is_exr(input) && input.seek_subimage(1, 0);
+  for (const Find find : {Find(find_plain), Find(find_rgb), Find(find_y), Find(find_grey)})
+    for (int part = 0; (part == 0 || has_parts) && input.seek_subimage(part, 0); ++part)
+      if (!(has_parts && input.spec().deep) && find(input.spec(), image)) return part;
+  input.seek_subimage(0, 0);
+  throw std::runtime_error("it has no channels R, G, B, nor grey (Y); its channels: " +
+                           joined(input.spec().channelnames));
+}
+
+/// Finds the channels of a picture, or those of a layer in any part. @return the part.
 int find_channels(OIIO::ImageInput& input, const std::string& layer, NativeImage& image) {
   if (layer.empty()) {
-    const OIIO::ImageSpec& spec = input.spec();
-    if (find_rgb(spec, image) || find_grey(spec, image)) return 0;
-    throw std::runtime_error("it has no channels R, G, B, nor grey (Y); its channels: " + joined(spec.channelnames));
+    const int part = find_colors(input, image);
+    if (is_exr(input)) say_choice(input, part, image);  // Others may not be read after they have been searched.
+    return part;
   }
   for (int part = 0; input.seek_subimage(part, 0); ++part)
     if (find_layer(input.spec(), layer, image)) return part;

@@ -31,14 +31,16 @@ void follow_bent_ray(const Wavefront& front, const WaitingPath& waiting, std::si
 BentView bent_view(const BentPaths& traced, const WaitingPath& waiting) {
   BentView view{0, 0, 0};
   const auto count = static_cast<double>(waiting.last - waiting.first);
+  int arrived = 0;
   for (std::size_t i = waiting.first; i < waiting.last; ++i) {
     const BentRay& ray = traced.rays[i];
     if (!ray.arrives) continue;
     const Vector3d& before = waiting.direction;
     view.radiance_scale += ray.radiance_scale / count;
     view.deflection += std::atan2(ray.direction.cross(before).norm(), ray.direction.dot(before)) / count;
-    view.arrives += 1 / count;
+    ++arrived;
   }
+  view.arrives = arrived / count;
   return view;
 }
 

@@ -94,7 +94,8 @@ struct FirstSurface {
   Eigen::Vector3f albedo = Eigen::Vector3f::Zero();     ///< In the working space, as denoisers expect it.
 };
 
-/// What the region does to the light of a ray that leaves the camera; means over the bands that it follows.
+/// What the region does to the light of a ray that leaves the camera; means over the bands that it follows, of which
+/// those that do not arrive count as 0.
 struct BentView {
   double radiance_scale = 1;  ///< Of radiance.
   double deflection = 0;      ///< Angle by which light turns, radians.

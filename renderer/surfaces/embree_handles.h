@@ -10,6 +10,7 @@
 #endif
 
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -18,6 +19,8 @@
 #include <vector>
 
 #include <Eigen/Core>
+
+#include "base/text/content_hash.h"
 
 namespace tensorray::embree {
 
@@ -135,6 +138,25 @@ inline void occluded(RTCScene scene, RTCRay& ray) {
   rtcInitIntersectContext(&context);
   rtcOccluded1(scene, &context, &ray);
 #endif
+}
+
+/// Lets rays through a geometry, but for the part `opacity` of them. Which rays meet it is a function of the ray and
+/// the triangle alone. @param opacity  Must outlive the geometry.
+inline void let_through(RTCGeometry geometry, const float& opacity) {
+  const auto filter = [](const RTCFilterFunctionNArguments* all) {
+    for (unsigned i = 0; i < all->N; ++i) {
+      const float ray[] = {RTCRayN_org_x(all->ray, all->N, i), RTCRayN_org_y(all->ray, all->N, i),
+                           RTCRayN_org_z(all->ray, all->N, i), RTCRayN_dir_x(all->ray, all->N, i),
+                           RTCRayN_dir_y(all->ray, all->N, i), RTCRayN_dir_z(all->ray, all->N, i)};
+      const std::uint64_t hash =
+          content_hash({reinterpret_cast<const char*>(ray), sizeof ray}, RTCHitN_primID(all->hit, all->N, i));
+      const float part = static_cast<float>(hash >> 40) * 0x1p-24f;
+      if (part >= *static_cast<const float*>(all->geometryUserPtr)) all->valid[i] = 0;
+    }
+  };
+  rtcSetGeometryUserData(geometry, const_cast<float*>(&opacity));
+  rtcSetGeometryIntersectFilterFunction(geometry, filter);
+  rtcSetGeometryOccludedFilterFunction(geometry, filter);
 }
 
 struct Release {

@@ -39,6 +39,7 @@ struct ShadedSurface {
   std::variant<TriangleMesh, RoundCurves> shape;
   std::vector<Eigen::Vector3f> normals;  ///< For each point, meshes only; any length. Empty: flat triangles.
   int material = 0;                      ///< Index of the material.
+  float opacity = 1;                     ///< Meshes only: the part of the rays that meet it; others pass.
   int light = -1;                        ///< Index of the AreaLight with this mesh, if the surface emits light.
 
   std::vector<Eigen::Vector3f> colors;  ///< For each point; working space, 0 to 1. Empty: the material's reflectance.

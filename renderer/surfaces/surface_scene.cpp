@@ -213,6 +213,7 @@ struct SurfaceScene::State {
     new_points(geometry.get(), mesh.vertices, nullptr);
     rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                                sizeof(mesh.triangles[0]), mesh.triangles.size());
+    if (surfaces[id].opacity < 1) embree::let_through(geometry.get(), surfaces[id].opacity);
     commit(id, geometry.get());
   }
 

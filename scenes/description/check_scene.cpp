@@ -174,7 +174,8 @@ std::vector<NamedFile> input_files(const SceneDescription& scene) {
   std::vector<NamedFile> files;
   if (!is_device(scene.path)) files.push_back({scene.path, "the scene file"});  // A scene may come through a pipe.
   files.push_back({scene.field.file, "`/field/file`"});
-  files.push_back({scene.field.bounds, "`/field/bounds`"});
+  if (const auto* bounds = std::get_if<std::filesystem::path>(&scene.field.bounds))
+    files.push_back({*bounds, "`/field/bounds`"});
   const char* const environment = std::getenv("OCIO");  // It counts only where the scene names no config.
   const bool is_own = !scene.output.ocio.empty();
   const std::string config = is_own ? scene.output.ocio : environment ? environment : "";

@@ -33,6 +33,10 @@ inline Choices<BorderChoice> choices(BorderChoice) {
   return {{"auto", BorderChoice::automatic}, {"fade", BorderChoice::fade}, {"extend", BorderChoice::extend}};
 }
 
+inline Choices<BoundsChoice> choices(BoundsChoice) {
+  return {{"auto", BoundsChoice::automatic}, {"none", BoundsChoice::none}};
+}
+
 inline Choices<BendingMethod> choices(BendingMethod) {
   return {{"auto", BendingMethod::automatic},
           {"euler", BendingMethod::euler},
@@ -67,7 +71,11 @@ inline Choices<LightCaustic> choices(LightCaustic) {
 }
 
 inline Choices<Annotation> choices(Annotation) {
-  return {{"scale", Annotation::scale}, {"axes", Annotation::axes}, {"legend", Annotation::legend}};
+  return {{"scale", Annotation::scale},
+          {"axes", Annotation::axes},
+          {"legend", Annotation::legend},
+          {"body", Annotation::body},
+          {"hidden", Annotation::hidden}};
 }
 
 inline Choices<Pattern> choices(Pattern) { return {{"none", Pattern::none}, {"checkerboard", Pattern::checkerboard}}; }

@@ -83,9 +83,12 @@ inline void describe(MaterialDescription& material, KeyVisitor& visit) {
   visit.only_for({"index"}, "kind", material.kind, {MaterialKind::glass});
 }
 
-/// What cubic interpolation takes inactive voxels for (Border); `automatic`: `extend` where obstacles or bounds are
-/// given, which stop light at the body that the active voxels are, else `fade`.
+/// What interpolation takes inactive voxels for (Border); `automatic`: `extend` where the field has a surface, or
+/// obstacles or bounds are given, which stop light at the body that the active voxels are, else `fade`.
 enum class BorderChoice { automatic, fade, extend };
+
+/// Where light bends: `automatic`: within the surface of the field's body, if it has one; `none`: in the whole box.
+enum class BoundsChoice { automatic, none };
 
 struct FieldDescription {
   std::filesystem::path file;                   ///< OpenVDB file with the field; empty if `generate` is given.
@@ -97,8 +100,8 @@ struct FieldDescription {
   Eigenvalues eigenvalues = Eigenvalues::automatic;
   Interpolation interpolation = Interpolation::cubic;
   BorderChoice border = BorderChoice::automatic;
-  std::optional<double> scale;   ///< Factor on the flexibility; none: "auto".
-  std::filesystem::path bounds;  ///< A closed mesh that cuts the volume; empty: none.
+  std::optional<double> scale;                               ///< Factor on the flexibility; none: "auto".
+  std::variant<BoundsChoice, std::filesystem::path> bounds;  ///< A file: a closed mesh that cuts the volume.
 };
 
 struct BendingDescription {
@@ -217,7 +220,7 @@ struct IntegratorDescription {
 };
 
 /// What is drawn over `image`.
-enum class Annotation { scale, axes, legend };
+enum class Annotation { scale, axes, legend, body, hidden };
 
 struct OutputDescription {
   std::vector<Output> kinds;                           ///< All kinds of output that any method can write.

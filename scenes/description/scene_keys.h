@@ -42,12 +42,15 @@ inline void describe(FieldDescription& field, KeyVisitor& visit) {
         knob());
   visit("interpolation", field.interpolation, "what the field is between its voxels: smooth (cubic), or linear");
   visit("border", field.border,
-        "cubic: inactive voxels fade to zero, or extend the values of active ones; auto extends where obstacles or "
-        "bounds are given");
+        "cubic: inactive voxels fade to zero, or extend the values of active ones; auto extends where the field has a "
+        "surface, or obstacles or bounds are given");
   visit("scale", field.scale,
         "factor on the flexibility; auto: the scale that shows the field's structure without tangling the light",
         not_zero().or_word("auto").as_knob());
-  visit("bounds", field.bounds, "closed mesh that limits the volume; light is straight outside it");
+  visit(
+      "bounds", field.bounds,
+      "closed mesh that limits the volume, outside which light is straight; auto: the surface of the field's body, if "
+      "its file has one; none: the box alone");
 }
 
 inline void describe(BendingDescription& bending, KeyVisitor& visit) {
@@ -200,7 +203,8 @@ inline void describe(OutputDescription& output, KeyVisitor& visit) {
   visit("display", output.display, "OpenColorIO display; default: that of the config", knob());
   visit("view", output.view,
         "OpenColorIO view; default: Soft highlights for light on a plate, otherwise that of the display", knob());
-  visit("annotations", output.annotations, "what is drawn over `image`: a scale bar, the world's axes, a legend");
+  visit("annotations", output.annotations,
+        "what is drawn over `image`: a scale bar, the world's axes, a legend, the lines of bodies");
   visit("caption", output.caption, "a line over `image`; {field.scale} is the value of a key, # counts frames");
 }
 

@@ -25,7 +25,8 @@
 namespace tensorray {
 namespace {
 
-const std::string mark = "tensorray work 2\n";
+const std::string mark = "tensorray work 3\n";
+constexpr std::uintmax_t quickly_hashed = 1u << 24;
 constexpr const char* damaged = "is damaged; remove it and render it again";
 constexpr const char* cut_off = "is cut off; remove it and render it again";
 
@@ -63,11 +64,24 @@ void unite(const std::string& file, const WorkFile& shard, WorkFile& all) {
   all.results.insert(shard.results.begin(), shard.results.end());
 }
 
-Json files_of(const SceneDescription& description) {
+Json identity_of(const std::filesystem::path& file, bool hashes_all) {
+  const std::uintmax_t size = std::filesystem::file_size(file);
+  Json identity{{"size", size}, {"time", std::filesystem::last_write_time(file).time_since_epoch().count()}};
+  if (hashes_all || size <= quickly_hashed) identity["hash"] = fmt::format("{:016x}", file_hash(file));
+  return identity;
+}
+
+bool is_same_file(const Json& there, const Json& here) {
+  if (!there.is_object()) return false;
+  const bool has_hashes = there.contains("hash") && here.contains("hash");
+  return has_hashes ? there["hash"] == here["hash"]
+                    : there.value("size", Json()) == here["size"] && there.value("time", Json()) == here["time"];
+}
+
+Json files_of(const SceneDescription& description, bool hashes_all) {
   Json files = Json::object();
   for (const NamedFile& file : input_files(description))
-    if (!file.path.empty() && file.path != description.path)
-      files[file.name] = fmt::format("{:016x}", file_hash(file.path));
+    if (!file.path.empty() && file.path != description.path) files[file.name] = identity_of(file.path, hashes_all);
   return files;
 }
 
@@ -183,7 +197,7 @@ WorkFile read_shards(const std::vector<std::string>& files) {
   return all;
 }
 
-Json origin_of(const Scene& scene) {
+Json origin_of(const Scene& scene, bool hashes_all) {
   const SceneDescription& description = scene.description;
   Json json = parse_value(description.text);
   json.erase("output");
@@ -194,7 +208,7 @@ Json origin_of(const Scene& scene) {
           {"scene", json},
           {"scale", scene.scale.scale},
           {"direction", {direction.x(), direction.y(), direction.z()}},
-          {"files", files_of(description)}};
+          {"files", files_of(description, hashes_all)}};
 }
 
 bool is_origin(const Json& json) {
@@ -215,8 +229,8 @@ std::string difference(const Json& there, const Json& here) {
   const std::string scene = scene_difference(there.value("scene", Json()), here.at("scene"), "");
   if (!scene.empty()) return scene;
   const Json files = there.value("files", Json::object());
-  for (const auto& [name, hash] : here.at("files").items())
-    if (files.value(name, Json()) != hash) return fmt::format("the file {} has other contents", name);
+  for (const auto& [name, file] : here.at("files").items())
+    if (!is_same_file(files.value(name, Json()), file)) return fmt::format("the file {} has other contents", name);
   for (const char* key : {"scale", "direction"})
     if (there.value(key, Json()) != here.at(key))
       return fmt::format("its {} is {}, not {}", key, shown(there.value(key, Json())), shown(here.at(key)));

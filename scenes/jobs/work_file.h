@@ -33,15 +33,18 @@ WorkFile read_work(const std::filesystem::path& path);
 WorkFile read_shards(const std::vector<std::string>& files);
 
 /// The version of the program; the method; the scene with its changes, but without its output files; the scale and the
-/// direction of the light, which a scene may leave open; and the hash of each file that the scene reads.
+/// direction of the light, which a scene may leave open; and of each file that the scene reads the size, the time of
+/// its last change, and the hash, by which copies on other machines are the same.
+/// @param hashes_all  False: large files have no hash, so that they are not read again.
 /// @throw std::runtime_error naming a file that cannot be read.
-Json origin_of(const Scene& scene);
+Json origin_of(const Scene& scene, bool hashes_all = true);
 
 /// Whether a file's JSON has all that an origin has.
 bool is_origin(const Json& json);
 
 /// The first difference between two origins, as "`/camera/resolution` is [800,800] there, [400,400] here"; empty if
-/// there is none. @param there  Of a file. @param here  Of the scene that is loaded.
+/// there is none. Files are compared by their hashes where both have one. @param there  Of a file. @param here  Of the
+/// scene that is loaded.
 std::string difference(const Json& there, const Json& here);
 
 /// Sets what a scene leaves open to what the origin has. The scene must be that of the origin.

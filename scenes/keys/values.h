@@ -284,7 +284,7 @@ struct Value<std::variant<Enum, std::filesystem::path>, std::enable_if_t<std::is
   }
 
   static std::string expectation(const Variant&, const Limits&) {
-    return fmt::format("one of {}, or a file (NAME.png)", quoted_choices<Enum>());
+    return fmt::format("one of {}, or a file (NAME.ENDING)", quoted_choices<Enum>());
   }
 
   static Json schema(const Variant&, const Limits& limits) {

@@ -156,8 +156,10 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha) 
     for (int c = 0; c < 3; ++c) out[c] = gain * in[c] / alpha;
     if (has_alpha) out[3] = in[3];
   }
+  const OutputDescription& output = scene.description.output;
+  draw_outline(image, render.outline, output.wants(Annotation::body), output.wants(Annotation::hidden));
   if (render.draw_legend) render.draw_legend(image, exposure);
-  draw_annotations(scene.description.output, render, image);
+  draw_annotations(output, render, image);
   scene.color.to_display(image);
   return image;
 }

@@ -1,7 +1,6 @@
 #include "scenes/outputs/write_outputs.h"
 
 #include <cstdint>
-#include <numeric>
 #include <vector>
 
 #include <sys/resource.h>
@@ -12,11 +11,9 @@
 namespace tensorray {
 namespace {
 
-/// Counts or powers by where rays ended. `emitted` is computed as their sum, so that the balance is exact.
+/// Counts or powers: what was emitted, and where it ended.
 template <class Number>
-Json balance(const std::array<Number, ray_end_count>& ends) {
-  Number emitted = 0;
-  for (const Number end : ends) emitted += end;
+Json balance(Number emitted, const std::array<Number, ray_end_count>& ends) {
   const auto of = [&](RayEnd end) { return ends[static_cast<int>(end)]; };
   Json stopped;
   for (const RayEnd end : {RayEnd::obstacle, RayEnd::step_limit, RayEnd::degenerate}) stopped[to_string(end)] = of(end);
@@ -28,8 +25,8 @@ Json balance(const std::array<Number, ray_end_count>& ends) {
 
 /// Photons of the method "scene".
 Json photon_counts(const PhotonCounts& counts) {
-  const auto of = [&](PhotonEnd end) { return counts[static_cast<std::size_t>(end)]; };
-  return {{"emitted", std::accumulate(counts.begin(), counts.end(), std::uint64_t{0})},
+  const auto of = [&](PhotonEnd end) { return counts.ends[static_cast<std::size_t>(end)]; };
+  return {{"emitted", counts.emitted},
           {"before", of(PhotonEnd::before)},
           {"landed", of(PhotonEnd::landed)},
           {"escaped", of(PhotonEnd::escaped)},
@@ -40,7 +37,7 @@ void add_scene_method(const SceneMethodStatistics& work, Json& json) {
   PhotonCounts all{};
   Json passes = Json::array();
   for (const PhotonCounts& counts : work.photons) {
-    for (std::size_t end = 0; end < all.size(); ++end) all[end] += counts[end];
+    all += counts;
     passes.push_back(photon_counts(counts));
   }
   json["bent_rays"] = json["photons"];
@@ -82,7 +79,9 @@ void commit_outputs(OutputFiles files) {
 
 std::string statistics_json(const Scene& scene, const Statistics& statistics, double seconds_writing, int threads) {
   EndCounts rays{};
+  std::uint64_t emitted = 0;
   std::array<double, ray_end_count> power{};
+  double emitted_power = statistics.beam_power;
   Json channels = Json::array();
   const bool has_power = !statistics.channel_power.empty() || !statistics.power.empty();
   for (std::size_t channel = 0; channel < statistics.ends.size(); ++channel) {
@@ -93,10 +92,13 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
         power[end] += static_cast<double>(count) * statistics.channel_power[channel];
       if (!statistics.power.empty()) power[end] += statistics.power[channel][end];
     }
+    emitted += statistics.emitted[channel];
+    if (!statistics.channel_power.empty())
+      emitted_power += static_cast<double>(statistics.emitted[channel]) * statistics.channel_power[channel];
     channels.push_back(
         {{"wavelength", scene.channels[channel].wavelength}, {"flexibility", scene.channels[channel].flexibility}});
     if (!statistics.channel_power.empty()) channels.back()["ray_power"] = statistics.channel_power[channel];
-    channels.back()["rays"] = balance(statistics.ends[channel]);
+    channels.back()["rays"] = balance(statistics.emitted[channel], statistics.ends[channel]);
   }
   const double seconds = scene.seconds + statistics.seconds_tracing + statistics.seconds_density +
                          statistics.seconds_drawing + statistics.seconds_color + seconds_writing;
@@ -105,7 +107,7 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
                {"seed", scene.description.seed},
                {"threads", threads},
                {"positions", statistics.positions},
-               {"photons", balance(rays)},
+               {"photons", balance(emitted, rays)},
                {"ray_steps", statistics.ray_steps},
                {"tensor_samples", statistics.tensor_samples},
                {"field",
@@ -124,7 +126,7 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
                {"peak_memory_bytes", peak_memory_bytes()},
                {"channels", channels}};
   if (statistics.error) json["error"] = *statistics.error;
-  if (has_power) json["power"] = balance(power);
+  if (has_power) json["power"] = balance(emitted_power, power);
   if (statistics.scene_method) add_scene_method(*statistics.scene_method, json);
   return json.dump(2) + "\n";
 }

@@ -28,11 +28,12 @@ void write_outputs(const Render& render, const Scene& scene, OutputFiles& files)
 void commit_outputs(OutputFiles files);
 
 /// The statistics of a render as JSON. `photons` counts rays; one position emits one ray for each wavelength. `power`
-/// is the power of these rays, in the unit of the light's irradiance times area. Both balance: emitted = deposited +
-/// missed + side + stopped; `side` is there if `integrator.side_light` leaves light out. `channels` has the counts of
-/// each wavelength. Of the method "scene", `photons` has the photons of its lights by their end, also for each pass:
-/// emitted = before + landed + escaped + stopped; `bent_rays` are those that are followed back, and `samples` those of
-/// the picture. `scene` is the path as UTF-8 (path_text.h).
+/// is the power of these rays, in the unit of the light's irradiance times area. Emitted light is counted where it
+/// starts, the rest where it ends, and both balance: emitted = deposited + missed + side + stopped; `side` is there if
+/// `integrator.side_light` leaves light out. `channels` has the counts of each wavelength. Of the method "scene",
+/// `photons` has the photons of its lights by their end, also for each pass: emitted = before + landed + escaped +
+/// stopped; `bent_rays` are those that are followed back, and `samples` those of the picture. `scene` is the path as
+/// UTF-8 (path_text.h).
 std::string statistics_json(const Scene& scene, const Statistics& statistics, double seconds_writing, int threads);
 
 }  // namespace tensorray

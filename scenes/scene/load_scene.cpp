@@ -48,12 +48,16 @@ std::vector<long long> identity_of(const std::filesystem::path& file) {
           status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
 }
 
-LoadedField load_field(const SceneDescription& scene, const Progress& progress) {
+/// What names the field in notes and errors.
+std::string source_of(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
-  const std::string source = field.generate ? kind_of(field.generate->generator) : field.file.string();
+  return field.generate ? kind_of(field.generate->generator) : field.file.string();
+}
+
+LoadedField load_field(const SceneDescription& scene, const Progress& progress) {
   const std::string key = field_key(scene) + fmt::format("{}", fmt::join(identity_of("/proc/self/exe"), " "));
   return share_field(
-      key, [&] { return prepare_field(open_field(scene), choices_of(scene), source); }, progress);
+      key, [&] { return prepare_field(open_field(scene), choices_of(scene), source_of(scene)); }, progress);
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
@@ -185,11 +189,20 @@ void require_near(const Beam& beam, const SceneDescription& description, const T
     if (!(corner.norm() < max_distance(field))) fail_size(description, "/light/aperture");
 }
 
+/// Whether light bends only within the surface of the field's body.
+bool ends_at_surface(const SceneDescription& description, const TensorField& field) {
+  const auto* word = std::get_if<BoundsChoice>(&description.field.bounds);
+  return word && *word == BoundsChoice::automatic && !field.surface().triangles.empty();
+}
+
 /// Loads the bounds of the field and its cut.
 Surfaces load_volume(const SceneDescription& description, const TensorField& field) {
   Surfaces surfaces;
   surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
-  if (!description.field.bounds.empty()) surfaces.cut = load_closed_mesh(description.field.bounds);
+  if (const auto* mesh = std::get_if<std::filesystem::path>(&description.field.bounds))
+    surfaces.cut = load_closed_mesh(*mesh);
+  else if (ends_at_surface(description, field))
+    surfaces.cut = closed_surface(field.surface(), source_of(description));
   return surfaces;
 }
 
@@ -271,6 +284,11 @@ LoadedField with_notes(MadeField made, const std::string& source) {
   const EigenvalueReport& eigenvalues = made.eigenvalues;
   notes.push_back(fmt::format("field: {}, {} voxels, eigenvalues {}, {}", source, made.voxels,
                               choice_name(eigenvalues.chosen), between_voxels(made)));
+  if (const double beyond = made.field->surface_beyond(); beyond > 0)
+    notes.push_back(fmt::format(
+        "warning: {}: the surface of the field's body reaches {:.2g} voxels beyond the field; light is straight there; "
+        "sample the field up to its surface",
+        source, beyond));
   if (is_coarse(made.resolution))
     notes.push_back(fmt::format(
         "warning: {}: voxels are too coarse: linear and cubic interpolation differ by {:.0f}% of the field's "
@@ -296,6 +314,8 @@ std::vector<std::string> notes_of(const SceneDescription& description, const Loa
 
 Scene make_scene(SceneDescription description, LoadedLight light, LoadedField loaded, std::vector<std::string> notes,
                  const Progress& progress) {
+  if (!loaded.is_known && ends_at_surface(description, loaded.field))
+    notes.push_back(fmt::format("body: surface of {} triangles", loaded.field.surface().triangles.size()));
   description.light.direction = load_direction(description, loaded.field, progress, notes);
   Beam beam = make_beam(description, loaded.field);
   Geometry geometry(load_surfaces(description, loaded.field, beam));
@@ -317,6 +337,17 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
 
 }  // namespace
 
+TriangleMesh closed_surface(TriangleMesh surface, const std::string& source) {
+  try {
+    require_closed(surface);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format(
+        "{}: the surface of the field's body: {}; `field.bounds: \"none\"` ignores it, a closed mesh replaces it",
+        source, error.what()));
+  }
+  return surface;
+}
+
 DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
   DepthRange range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   for (const Eigen::Vector3d& corner : field.corners()) {
@@ -333,18 +364,28 @@ void require_near(const Plate& plate, const char* pointer, const SceneDescriptio
     fail_size(description, pointer);
 }
 
-Interpolant interpolant_of(const SceneDescription& description) {
-  const FieldDescription& field = description.field;
-  const bool stops = !description.obstacles.empty() || !field.bounds.empty();
-  const bool extends = field.border == BorderChoice::automatic ? stops : field.border == BorderChoice::extend;
-  return {field.interpolation, extends ? Border::extend : Border::fade};
-}
-
 FieldChoices choices_of(const SceneDescription& description) {
-  return {description.field.smooth, description.field.eigenvalues, interpolant_of(description)};
+  const FieldDescription& field = description.field;
+  const bool is_free = field.border == BorderChoice::automatic;
+  const auto* word = std::get_if<BoundsChoice>(&field.bounds);
+  const bool stops = !description.obstacles.empty() || !word;
+  FieldChoices choices;
+  choices.smoothing = field.smooth;
+  choices.eigenvalues = field.eigenvalues;
+  const bool extends = is_free ? stops : field.border == BorderChoice::extend;
+  choices.interpolant = {field.interpolation, extends ? Border::extend : Border::fade};
+  choices.keeps_surface = !word || *word != BoundsChoice::none;
+  choices.at_surface = is_free || extends ? Border::extend : Border::fade;
+  return choices;
 }
 
-LoadedField prepare_field(const BlockSource& blocks, const FieldChoices& choices, const std::string& source) {
+LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const std::string& source) {
+  if (!choices.keeps_surface && !blocks.surface.triangles.empty()) {
+    BlockSource without = blocks;
+    without.surface = {};
+    return prepare_field(without, choices, source);
+  }
+  if (!blocks.surface.triangles.empty()) choices.interpolant.border = choices.at_surface;
   if (choices.smoothing == 0) return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source);
   TensorGrid grid = to_grid(blocks);
   const std::size_t non_finite = remove_non_finite(grid);
@@ -362,8 +403,10 @@ std::string field_key(const SceneDescription& description) {
     field.erase("scale");
     field.erase("bounds");
   }
-  const Interpolant interpolant = interpolant_of(description);
-  return nlohmann::json{field, identity_of(description.field.file), interpolant.between, interpolant.border}.dump();
+  const FieldChoices choices = choices_of(description);
+  return nlohmann::json{field, identity_of(description.field.file), choices.interpolant.between,
+                        choices.interpolant.border, choices.keeps_surface}
+      .dump();
 }
 
 std::optional<LoadedField> field_of(const std::optional<Scene>& before, const SceneDescription& description) {

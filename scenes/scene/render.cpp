@@ -11,10 +11,8 @@ namespace {
 
 void warn_of_step_limit(Render& render) {
   std::uint64_t emitted = 0, limited = 0;
-  for (const EndCounts& counts : render.statistics.ends) {
-    for (const std::uint64_t count : counts) emitted += count;
-    limited += counts[static_cast<int>(RayEnd::step_limit)];
-  }
+  for (const std::uint64_t count : render.statistics.emitted) emitted += count;
+  for (const EndCounts& counts : render.statistics.ends) limited += counts[static_cast<int>(RayEnd::step_limit)];
   if (100 * limited > emitted)
     render.warnings.push_back(fmt::format("{:.0f}% of the rays were given up after `bending.max_steps` steps; raise it",
                                           100.0 * static_cast<double>(limited) / static_cast<double>(emitted)));
@@ -28,6 +26,10 @@ void warn_of_annotations(const Scene& scene, Render& render) {
     render.warnings.push_back(
         "`/output/annotations`: a picture of a perspective camera has no single scale, and gets no scale bar; choose "
         "the `/camera/projection` \"orthographic\"");
+  if ((output.wants(Annotation::body) || output.wants(Annotation::hidden)) && render.outline.empty())
+    render.warnings.push_back(
+        "`/output/annotations`: there are no lines of a body: light on a plate and a lens have them, where the field "
+        "has a surface (`/field/bounds`) or there are `/obstacles`");
   if (output.wants(Annotation::legend) && !render.draw_legend && !render.display)
     render.warnings.push_back(
         fmt::format("`/output/annotations`: this picture of {} has no colours with a meaning, and gets no legend",

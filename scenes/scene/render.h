@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "base/process/job.h"
+#include "renderer/charts/annotations.h"
 #include "renderer/film/film.h"
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
@@ -33,12 +34,15 @@ struct SceneMethodStatistics {
 };
 
 struct Statistics {
-  std::uint64_t positions = 0;  ///< Positions from which light was emitted.
-  std::vector<EndCounts> ends;  ///< Numbers of rays by channel and end.
+  std::uint64_t positions = 0;         ///< Positions from which light was emitted.
+  std::vector<std::uint64_t> emitted;  ///< Numbers of rays by channel, counted where they start, ...
+  std::vector<EndCounts> ends;         ///< ... and by channel and end, counted there.
   /// Power of one ray of each channel, for a beam of irradiance 1; empty if rays carry no power.
   std::vector<double> channel_power;
-  /// Power by channel and end, for a beam of irradiance 1; if rays of a channel differ in power. Empty otherwise.
+  /// Power by channel and end, for a beam of irradiance 1; if rays of a channel differ in power. Empty otherwise. And
+  /// that of the whole beam.
   std::vector<std::array<double, ray_end_count>> power;
+  double beam_power = 0;
   std::optional<SceneMethodStatistics> scene_method;  ///< Its `ends` are those of all rays that bend.
   std::optional<double> error;  ///< Estimated relative error of the picture, if the scene bounds it.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
@@ -67,7 +71,8 @@ struct Render {
   ImageMetadata metadata;                 ///< Entries of the method for the headers of its files.
   /// Writes the tubes about `paths`; empty unless the scene asks for them.
   std::function<void(const std::filesystem::path&, const std::vector<Path>& paths)> write_tubes;
-  std::optional<PictureView> view;  ///< Of `linear`; none: there is no picture.
+  std::vector<OutlineStroke> outline;  ///< Lines of bodies, in pixels of the picture, if annotations want them.
+  std::optional<PictureView> view;     ///< Of `linear`; none: there is no picture.
   /// Draws a legend over a scene-linear picture whose exposure is so many stops; empty: no legend.
   std::function<void(Image&, double exposure)> draw_legend;
   Statistics statistics;

@@ -68,22 +68,23 @@ struct FieldChoices {
   double smoothing = 0;  ///< Deviation of a Gaussian, voxels; 0: none.
   Eigenvalues eigenvalues = Eigenvalues::automatic;
   Interpolant interpolant;
+  bool keeps_surface = true;           ///< Whether the field ends at its surface, if it has one.
+  Border at_surface = Border::extend;  ///< Instead of the interpolant's, of a field that does.
 };
 
 inline bool operator!=(const FieldChoices& a, const FieldChoices& b) {
-  return a.smoothing != b.smoothing || a.eigenvalues != b.eigenvalues || a.interpolant != b.interpolant;
+  return a.smoothing != b.smoothing || a.eigenvalues != b.eigenvalues || a.interpolant != b.interpolant ||
+         a.keeps_surface != b.keeps_surface || a.at_surface != b.at_surface;
 }
 
-/// What the field of a scene is between its voxels, and all choices.
-Interpolant interpolant_of(const SceneDescription& description);
 FieldChoices choices_of(const SceneDescription& description);
 
 /// Removes voxels that are not finite, smooths the others, and then changes their eigenvalues.
 /// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
-LoadedField prepare_field(const BlockSource& blocks, const FieldChoices& choices, const std::string& source);
+LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const std::string& source);
 
 /// Descriptions of scenes with the same field have the same key: all keys of the field but `scale` and `bounds`, what
-/// is between its voxels, and what tells whether its file has changed.
+/// is between its voxels, whether it keeps its surface, and what tells whether its file has changed.
 std::string field_key(const SceneDescription& description);
 
 /// The field of a scene that was loaded before, if a description has the same; both share the voxels.
@@ -95,6 +96,10 @@ std::optional<LoadedField> field_of(const std::optional<Scene>& before, const Sc
 /// @throw std::runtime_error, one line that names the file and the fix; SceneError if a value of the scene does not fit
 /// the loaded data; Cancelled.
 Scene load_scene(SceneDescription description, const Progress& progress, std::optional<LoadedField> field = {});
+
+/// The surface of a field's body, as what cuts the volume. @param source  Names the field in errors.
+/// @throw std::runtime_error, one line that names the fix, if it is not closed.
+TriangleMesh closed_surface(TriangleMesh surface, const std::string& source);
 
 /// Where the volume begins and ends along a direction, as signed distances from an origin, world units.
 struct DepthRange {

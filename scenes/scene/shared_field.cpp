@@ -35,6 +35,8 @@ struct FieldRest {
     archive.copy(parts.max_norm);
     archive.copy_list(parts.bricks);
     archive.copy_list(parts.strongest);
+    archive.copy_list(parts.surface.vertices);
+    archive.copy_list(parts.surface.triangles);
     archive.copy(stride);
     archive.copy(components);
     archive.copy(eigenvalues);
@@ -72,6 +74,7 @@ bool complete_file(const LoadedField& loaded) {
   rest.parts.max_norm = field.max_norm();
   rest.parts.bricks = field.bricks();
   for (const Eigen::Vector3i& brick : field.bricks()) rest.parts.strongest.push_back(field.brick(brick).strongest);
+  rest.parts.surface = field.surface();
   rest.stride = memory.stride;
   rest.components = memory.components;
   rest.eigenvalues = loaded.eigenvalues;

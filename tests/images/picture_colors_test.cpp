@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -310,6 +311,67 @@ TEST(PictureLayers, AreChosenByName) {
   EXPECT_EQ(light_of("a.exr", content, "Z"), Vector3d(4, 4, 4));
   EXPECT_THAT(message([&] { light_of("a.exr", content, "rim"); }),
               HasSubstr("it has no layer \"rim\"; its layers: fill, key"));
+}
+
+/// A part of an EXR: one pixel. @param channels  In alphabetical order, with their values.
+struct ExrPart {
+  std::string name;
+  std::vector<std::pair<std::string, float>> channels;
+};
+
+/// A file of several parts; or of one, which has no name.
+std::string exr_parts(const std::vector<ExrPart>& parts) {
+  const auto pixel = [](const ExrPart& part) {
+    std::vector<float> values;
+    for (const auto& [name, value] : part.channels) values.push_back(value);
+    return values;
+  };
+  const auto names = [](const ExrPart& part) {
+    std::vector<std::string> list;
+    for (const auto& [name, value] : part.channels) list.push_back(name);
+    return list;
+  };
+  if (parts.size() == 1) return exr_file({0, 0, 0, 0}, {0, 0, 0, 0}, names(parts[0]), pixel(parts[0]));
+  std::string file = "\x76\x2f\x31\x01" + little_endian(2 | 0x1000), tables, chunks;
+  for (const ExrPart& part : parts) {
+    std::vector<std::pair<std::string, int>> channels;
+    for (const std::string& name : names(part)) channels.emplace_back(name, 1);
+    const std::string header = exr_header({0, 0, 0, 0}, {0, 0, 0, 0}, channels);
+    file += header.substr(8, header.size() - 9) + exr_attribute("chunkCount", "int", little_endian(1)) +
+            exr_attribute("name", "string", part.name) + exr_attribute("type", "string", "scanlineimage") + '\0';
+  }
+  file += '\0';
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    tables += little_endian(static_cast<std::uint64_t>(file.size() + 8 * parts.size() + chunks.size()));
+    chunks += little_endian(static_cast<std::int32_t>(i)) + little_endian(0) +
+              little_endian(static_cast<std::int32_t>(4 * parts[i].channels.size()));
+    for (const float value : pixel(parts[i])) chunks += little_endian(value);
+  }
+  return file + tables + chunks;
+}
+
+TEST(PictureLayers, ColoursCountBeforeDepthAndItIsSaid) {
+  const ExrPart depth{"depth", {{"Z", 9}}}, plain{"rgba", {{"B", 3}, {"G", 2}, {"R", 1}}},
+      diffuse{"light", {{"diffuse.blue", 6}, {"diffuse.green", 5}, {"diffuse.red", 4}}},
+      nuke{"", {{"depth.Z", 9}, {"diffuse.blue", 6}, {"diffuse.green", 5}, {"diffuse.red", 4}}}, grey{"g", {{"Y", 7}}};
+  for (const auto& [parts, light, said] : std::vector<std::tuple<std::vector<ExrPart>, Vector3d, std::string>>{
+           {{depth, plain}, {1, 2, 3}, "a.exr: its colours are taken from the part \"rgba\"; its layers: depth, rgba"},
+           {{plain, depth}, {1, 2, 3}, ""},
+           {{plain, {"right", {{"B", 0}, {"G", 0}, {"R", 0}}}},
+            {1, 2, 3},
+            "the part \"rgba\"; its layers: rgba, right"},
+           {{depth, diffuse, plain}, {1, 2, 3}, "the part \"rgba\""},
+           {{depth, diffuse}, {4, 5, 6}, "the layer \"diffuse\"; its layers: depth, light, diffuse"},
+           {{nuke}, {4, 5, 6}, "the layer \"diffuse\"; its layers: depth, diffuse"},
+           {{depth, grey}, {7, 7, 7}, "its grey is taken from the part \"g\""},
+           {{depth, {"far", {{"Z", 8}}}}, {9, 9, 9}, ""}}) {
+    std::vector<std::string> notes;
+    EXPECT_EQ(light_of("a.exr", exr_parts(parts), "", &notes), light) << said;
+    ASSERT_EQ(notes.size(), said.empty() ? 0u : 1u) << said;
+    EXPECT_THAT(notes.empty() ? said : notes[0], HasSubstr(said));
+  }
+  EXPECT_EQ(light_of("a.exr", exr_parts({nuke}), "diffuse"), Vector3d(4, 5, 6));
+  EXPECT_EQ(light_of("a.exr", exr_parts({depth, diffuse}), "light"), Vector3d(4, 5, 6));
 }
 
 TEST(PictureColors, NonFiniteTexelsAreCountedAndSaid) {

@@ -1,12 +1,16 @@
 #include "tools/import/import_file.h"
 
-#include <gtest/gtest.h>
+#include <functional>
+
+#include <gmock/gmock.h>
 #include <vtkDoubleArray.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 
 #include "base/process/progress.h"
+#include "tests/import/hdf5_writer.h"
 #include "tests/import/mesh_files.h"
+#include "tests/import/openfoam_case.h"
 #include "tests/import/vtk_files.h"
 
 namespace tensorray {
@@ -67,6 +71,137 @@ TEST(ImportFileTest, OnlyNumPyFilesTakeAnOrigin) {
   settings.origin = Eigen::Vector3d::Zero();
   ImportReport report;
   EXPECT_THROW(import_tensors(settings, Progress(), report), std::invalid_argument);
+}
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  return text;
+}
+
+/// Two steps, of which the second one was announced and not written: the first one is taken, which is said.
+TEST(ImportFileTest, TheLastCompleteStepIsTaken) {
+  const TemporaryFolder folder;
+  const auto xdmf = [&](const char* second) {
+    std::string grids;
+    { Hdf5Writer(folder / "a.h5").write("/first", {8, 9}, std::vector<double>(72, 5)); }
+    for (const std::string place : {"a.h5:/first", second})
+      grids +=
+          "<Grid><Topology TopologyType=\"3DCoRectMesh\" Dimensions=\"2 2 2\"/><Geometry "
+          "GeometryType=\"ORIGIN_DXDYDZ\"><DataItem Dimensions=\"3\" Format=\"XML\">0 0 0</DataItem><DataItem "
+          "Dimensions=\"3\" Format=\"XML\">1 1 1</DataItem></Geometry><Attribute Name=\"T\" Center=\"Node\"><DataItem "
+          "Dimensions=\"8 9\" Format=\"HDF\">" +
+          place + "</DataItem></Attribute></Grid>";
+    write_bytes(folder / "a.xdmf", "<Xdmf><Domain><Grid GridType=\"Collection\" CollectionType=\"Temporal\">" + grids +
+                                       "</Grid></Domain></Xdmf>");
+    return folder / "a.xdmf";
+  };
+  const auto pvd = [&](const std::string& second) {
+    write_xml(*bar(0, 1), folder / "first.vtu");
+    write_bytes(folder / "second.vtu", second);
+    if (second.empty()) std::filesystem::remove(folder / "second.vtu");
+    write_bytes(folder / "a.pvd",
+                "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"first.vtu\"/><DataSet "
+                "timestep=\"1\" file=\"second.vtu\"/></Collection></VTKFile>\n");
+    return folder / "a.pvd";
+  };
+  const auto openfoam = [&] {
+    OpenFoamCase::write(folder / "case");
+    const std::filesystem::path field = folder / "case" / "0.5" / "gradU";
+    std::filesystem::resize_file(field, file_size(field) / 2);
+    return folder / "case";
+  };
+  struct Row {
+    std::function<std::filesystem::path()> make;
+    const char *array, *words;
+  };
+  const Row table[] = {{[&] { return xdmf("a.h5:/second"); }, "T", "has no dataset /second"},
+                       {[&] { return xdmf("b.h5:/second"); }, "T", "b.h5: is missing"},
+                       {[&] { return pvd(""); }, "tensor", "second.vtu: does not exist"},
+                       {[&] { return pvd("<VTKFile type=\"UnstructuredGrid\">"); }, "tensor", "second.vtu: is cut off"},
+                       {[&] { return openfoam(); }, "gradU", ""}};
+  for (const Row& row : table) {
+    ImportSettings settings;
+    settings.files = {row.make()};
+    settings.array = row.array;
+    ImportReport report;
+    const TensorGrid grid = import_tensors(settings, Progress(), report);
+    EXPECT_LT(grid.blocks[0].values[0].norm(), 900) << row.words;
+    EXPECT_THAT(joined(report.notes), AllOf(HasSubstr("step 1 of 2 is taken"), HasSubstr(row.words)));
+    settings.step = 1;
+    EXPECT_ANY_THROW(import_tensors(settings, Progress(), report)) << row.words;
+  }
+  ImportSettings settings;  // A field may be missing where none was wanted, so that no other step is taken.
+  settings.files = {openfoam()};
+  settings.array = "gradU";
+  std::filesystem::remove(settings.files[0] / "0.5" / "gradU");
+  ImportReport report;
+  EXPECT_THAT([&] { import_tensors(settings, Progress(), report); },
+              testing::ThrowsMessage<std::invalid_argument>(HasSubstr("(step 2 of 2 is taken; --steps chooses")));
+}
+
+TEST(ImportFileTest, GuessesAndTensorsThatAreHardlyMeantAreSaid) {
+  const TemporaryFolder folder;
+  struct Row {
+    const char* name;
+    std::function<double(int tuple, int component)> value;
+    const char* warning;  ///< Empty: none.
+  };
+  const auto usual = [](int tuple, int component) { return 1.0 + tuple + component; };
+  const auto mixed = [&](double value) {
+    return [=](int tuple, int component) { return tuple % 4 == 1 ? value : usual(tuple, component); };
+  };
+  const Row table[] = {{"usual", usual, ""},
+                       {"zero", [](int, int) { return 0.0; }, "all tensors are zero"},
+                       {"same", [](int, int component) { return 1.0 + component; }, "all tensors are the same"},
+                       {"1e20", mixed(1e20), "values are as 1e+20"},
+                       {"1e30", mixed(-1e30), "values are as -1e+30"},
+                       {"netCDF", mixed(9.969209968386869e36), "values are as 9.96921e+36"},
+                       {"-999", mixed(-999), "values are as -999,"},
+                       {"-9999", mixed(-9999), "values are as -9999,"},
+                       {"a component of -999", [&](int t, int c) { return c == 3 ? -999 : usual(t, c); }, ""},
+                       {"NaN", [](int, int) { return NAN; }, "NaN"}};
+  for (const auto& [ending, set] : data_sets())
+    for (const Row& row : table) {
+      vtkDataArray& array = *set->GetPointData()->GetArray("tensor");
+      for (int i = 0; i < array.GetNumberOfTuples(); ++i)
+        for (int k = 0; k < 9; ++k) array.SetComponent(i, k, row.value(i, k));
+      write_xml(*set, folder / ("a" + ending));
+      ImportSettings settings;
+      settings.files = {folder / ("a" + ending)};
+      settings.array = "tensor";
+      ImportReport report;
+      std::string said;
+      try {
+        import_tensors(settings, Progress(), report);
+        said = joined(report.warnings);
+      } catch (const std::exception& error) {
+        said = error.what();
+      }
+      EXPECT_THAT(said, HasSubstr(row.warning)) << row.name << ending;
+      EXPECT_EQ(said.empty(), row.warning[0] == '\0') << row.name << ending << said;
+    }
+  const auto set = bar(0, 3);
+  vtkNew<vtkDoubleArray> more;
+  more->SetName("tensor");
+  more->SetNumberOfComponents(12);
+  more->SetNumberOfTuples(3);
+  more->Fill(1);
+  set->GetCellData()->AddArray(more);
+  write_xml(*set, folder / "a.vtu");
+  ImportSettings settings;
+  settings.files = {folder / "a.vtu"};
+  ImportReport report;
+  import_tensors(settings, Progress(), report);
+  EXPECT_THAT(joined(report.notes), HasSubstr("\"tensor\" is at points and at cells: that at points is taken"));
+  settings.cell_values = CellValues::constant;
+  settings.order = TensorOrder::vtk;
+  import_tensors(settings, Progress(), report);
+  EXPECT_THAT(joined(report.notes),
+              AllOf(HasSubstr("that at cells is taken"), HasSubstr("12 components: the first six")));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 /// Small data sets of every kind with a point array "tensor" and a cell array "rate", and files that contain them.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -27,9 +28,9 @@
 
 namespace tensorray {
 
-/// The error of reading a file; empty if it is read.
-inline std::string read_error(const std::filesystem::path& path) {
-  return error_in_child(path, [&] { read_vtk_source(path); });
+/// The error of reading a file at a step, or at the last complete one; empty if it is read.
+inline std::string read_error(const std::filesystem::path& path, std::optional<int> step = std::nullopt) {
+  return error_in_child(path, [&] { read_vtk_source(path, step); });
 }
 
 /// The value of component c at a position.

@@ -2,6 +2,7 @@
 
 import gc
 import os
+import pickle
 import tempfile
 import unittest
 import weakref
@@ -68,6 +69,28 @@ class FieldsTest(unittest.TestCase):
         np.testing.assert_array_equal(field.tensors, tensors)
         np.testing.assert_allclose(field.to_world @ [0, 0, 0, 1], [1, 2, 3, 1])
 
+    def test_the_surface_of_a_body_travels(self):
+        points = np.array([[0, 0, 0], [1.3, 0, 0], [0, 1.7, 0], [0, 0, 1.9]]) + 0.05
+        triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+        field = tr.Field(np.tile(np.diag([1.0, 2.0, 3.0]), (9, 9, 9, 1, 1)), 0.25, surface=(points, triangles))
+        with tempfile.TemporaryDirectory() as folder:
+            field.write(os.path.join(folder, "field.vdb"))
+            fields = [field, tr.read_vdb(os.path.join(folder, "field.vdb"))]
+        fields += [pickle.loads(pickle.dumps(each)) for each in fields]
+        for each in fields:
+            np.testing.assert_allclose(each.surface[0], points, atol=1e-12)
+            np.testing.assert_array_equal(each.surface[1], triangles)
+        self.assertIsNone(tr.Field(field.tensors).surface)
+        # Light bends within it alone: one ray passes it, and one goes through.
+        tracing = {"positions": [[1.6, 1.6, -1], [0.4, 0.5, -1]], "directions": [0.1, 0, 1], "s": 0.5}
+        turned = np.abs(tr.trace(field, **tracing).directions - np.array([0.1, 0, 1]) / np.hypot(0.1, 1)).max(axis=1)
+        self.assertLess(turned[0], 1e-6)
+        self.assertGreater(turned[1], 1e-3)
+        self.assertGreater(tr.trace(field, **tracing, bounds="none").lengths[0], 0)
+        self.assertGreater(np.abs(tr.trace(field, **tracing, bounds="none").directions[0, 0] - 0.0995), 1e-3)
+        with self.assertRaisesRegex(RuntimeError, "open edges"):
+            tr.trace(tr.Field(field.tensors, surface=(points, triangles[1:])), [0, 0, 0], [0, 0, 1], 1)
+
     def test_invariants(self):
         tensors = random_tensors((4, 9, 10))
         tensors[1, 2, 3] = np.nan
@@ -93,6 +116,8 @@ class FieldsTest(unittest.TestCase):
             (ValueError, "empty", lambda: tr.Field(tensors[:0])),
             (ValueError, "inverted", lambda: tr.Field(tensors, voxel_size=0)),
             (ValueError, r"\(4, 4\)", lambda: tr.Field(tensors, to_world=np.eye(3))),
+            (ValueError, "not there", lambda: tr.Field(tensors, surface=(np.eye(3), [[0, 1, 3]]))),
+            (ValueError, r"\(n, 3\)", lambda: tr.Field(tensors, surface=(np.eye(2), [[0, 1, 1]]))),
             (ValueError, "kind", lambda: tr.make("whirl")),
             (ValueError, "core", lambda: tr.make("vortex", core=-1)),
             (ValueError, "unknown", lambda: tr.make("vortex", heart=1)),

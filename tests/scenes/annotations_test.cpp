@@ -9,8 +9,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/files/temporary_folder.h"
+#include "base/geometry/box.h"
 #include "base/process/progress.h"
 #include "integrators/methods/read_scene.h"
+#include "renderer/meshes/mesh.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
@@ -115,6 +118,26 @@ TEST(Annotations, AreInTheirCornersAndNowhereElse) {
   }
 }
 
+/// The lines of a body, where there is one: an obstacle, at the bottom of the volume. In no other file.
+TEST(Annotations, ShowBodies) {
+  const TemporaryFolder folder;
+  write_mesh(
+      folder / "box.ply",
+      box_mesh({Eigen::Vector3d(-0.5, -0.5, -0.9), Eigen::Vector3d(0.5, 0.5, -0.5)}, Eigen::Affine3d::Identity()), {});
+  for (const MethodCase& method : methods) {
+    const bool has_lines = method.name == "photons" || method.name == "three colours" || method.name == "lens";
+    MethodCase with = method;
+    Json json = Json::parse(method.text);
+    json["obstacles"] = {{{"file", (folder / "box.ply").string()}}};
+    with.text = json.dump();
+    const Rendered plain = rendered(with, nullptr), visible = rendered(with, "body");
+    EXPECT_EQ(visible.display.pixels != plain.display.pixels, has_lines) << method.name;
+    EXPECT_EQ(visible.render.linear.pixels, plain.render.linear.pixels) << method.name;
+    EXPECT_EQ(visible.render.warnings.size() - plain.render.warnings.size(), has_lines ? 0u : 1u) << method.name;
+  }
+  EXPECT_THAT(rendered(methods[0], "body").render.warnings.back(), HasSubstr("no lines of a body"));
+}
+
 /// Pixels of a plate have its size / resolution, those of an orthographic camera its height / resolution.
 TEST(Annotations, KnowTheSizeOfPixels) {
   Plate plate;
@@ -174,7 +197,8 @@ TEST(Annotations, AreAListOfNames) {
       described(wrong);
       ADD_FAILURE() << wrong;
     } catch (const SceneError& error) {
-      EXPECT_THAT(error.what(), HasSubstr(R"(`/output/annotations` must be a list of "scale", "axes", "legend")"));
+      EXPECT_THAT(error.what(),
+                  HasSubstr(R"(`/output/annotations` must be a list of "scale", "axes", "legend", "body", "hidden")"));
     }
   }
 }

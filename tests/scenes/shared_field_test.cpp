@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "base/files/temporary_folder.h"
+#include "renderer/meshes/mesh.h"
 #include "scenes/scene/scene.h"
 #include "volumes/grids/page_memory.h"
 
@@ -25,11 +26,14 @@ LoadedField loaded_field(bool symmetric, const Interpolant& interpolant) {
     for (int i = 0; i < 9; ++i) T.data()[i] = std::sin(at.x() + 1.7 * i) * std::cos(0.3 * at.y() * i) + 0.1 * at.z();
     return Eigen::Matrix3d(symmetric ? Eigen::Matrix3d(T + T.transpose()) : T);
   };
-  return prepare_field(dense_source(box, to_world, value), {0, Eigenvalues::raw, interpolant}, "the field");
+  BlockSource source = dense_source(box, to_world, value);
+  source.surface = box_mesh({Eigen::Vector3d(-6, 3, 1), Eigen::Vector3d(15, 20.5, 30)}, to_world);
+  return prepare_field(source, {0, Eigenvalues::raw, interpolant}, "the field");
 }
 
 bool are_same(const TensorField& a, const TensorField& b) {
   if (a.bricks() != b.bricks() || a.memory().stride != b.memory().stride || a.interpolant() != b.interpolant() ||
+      a.surface().vertices != b.surface().vertices || a.surface().triangles != b.surface().triangles ||
       a.is_symmetric() != b.is_symmetric() || a.max_norm() != b.max_norm() ||
       a.to_world().matrix() != b.to_world().matrix() || a.to_index().matrix() != b.to_index().matrix() ||
       !a.index_bounds().isApprox(b.index_bounds(), 0) || !a.voxels().isApprox(b.voxels(), 0))

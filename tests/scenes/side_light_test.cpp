@@ -31,9 +31,9 @@ Render light_of(const std::string& density, double s, const Json& side_light) {
   return render(load_scene(read_scene_json(json, "scene.json"), Progress()), Progress());
 }
 
-/// Power by end, as a part of all.
+/// Power by end, as a part of what is emitted.
 double share(const Render& render, RayEnd which) {
-  double power = 0, all = 0;
+  double power = 0, all = 0, emitted = render.statistics.beam_power;
   for (std::size_t channel = 0; channel < render.statistics.ends.size(); ++channel)
     for (int end = 0; end < ray_end_count; ++end) {
       const double each = render.statistics.power.empty() ? static_cast<double>(render.statistics.ends[channel][end])
@@ -41,7 +41,10 @@ double share(const Render& render, RayEnd which) {
       all += each;
       if (end == static_cast<int>(which)) power += each;
     }
-  return power / all;
+  for (const std::uint64_t count : render.statistics.emitted)
+    emitted += render.statistics.power.empty() ? static_cast<double>(count) : 0;
+  EXPECT_NEAR(all / emitted, 1, 1e-6);
+  return power / emitted;
 }
 
 /// In this field V = (sin θ, 0, −cos θ) turns by θ' = −s cos 2θ. All light is displaced alike, by x on its way from

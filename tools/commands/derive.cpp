@@ -61,7 +61,8 @@ void derive(const DeriveOptions& options, const Progress& progress) {
     grids.push_back(invariant_grid(which, field));
   }
   progress.update("writing", 0, 1);
-  file.write([&](const std::filesystem::path& path) { write_scalar_vdb(path, grids, file_metadata(field)); });
+  file.write(
+      [&](const std::filesystem::path& path) { write_scalar_vdb(path, grids, file_metadata(field), field.surface); });
   const auto bytes = static_cast<double>(std::filesystem::file_size(file.path()));
   progress.update("writing", 1, 1);
   file.commit();

@@ -40,6 +40,7 @@ struct FieldInfo {
   Eigen::Matrix4d transform;  ///< From voxel indices to world.
   std::map<std::string, std::string> metadata;
   FieldStatistics statistics;
+  TriangleMesh surface;
   Resolution resolution;
 
   double stable_step_in_voxels() const {
@@ -49,9 +50,10 @@ struct FieldInfo {
 
 FieldInfo field_info(const InfoOptions& options, const std::string& name) {
   TensorGrid grid = read_tensor_vdb(options.file, name, options.derive);
-  FieldInfo info{grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid), {}};
+  FieldInfo info{grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid), grid.surface, {}};
   if (info.statistics.active_voxels > info.statistics.non_finite) {
-    const MadeField made = make_field(view_of(grid), Eigenvalues::raw, {Interpolation::cubic, Border::fade});
+    const Border border = grid.surface.triangles.empty() ? Border::fade : Border::extend;
+    const MadeField made = make_field(view_of(grid), Eigenvalues::raw, {Interpolation::cubic, border});
     info.resolution = made.resolution;
     info.statistics.memory_bytes = made.field->memory_bytes();
   }
@@ -114,6 +116,8 @@ Json to_json(const FieldInfo& field) {
   // Infinite for a field that does not bend light. JSON has no number for that and gets null.
   json["stable_step"] = {{"world_at_flexibility_1", s.stable_step(1)},
                          {"voxels_at_flexibility_0.3", field.stable_step_in_voxels()}};
+  if (!field.surface.triangles.empty())
+    json["surface"] = {{"triangles", field.surface.triangles.size()}, {"volume", field.surface.volume()}};
   json["metadata"] = field.metadata;
   return json;
 }
@@ -156,6 +160,9 @@ void print_grid(const FieldInfo& field) {
   print_row("active voxels", fmt::format("{}", s.active_voxels));
   print_row("not finite", fmt::format("{}", s.non_finite));
   print_row("memory", bytes_text(static_cast<double>(s.memory_bytes)));
+  if (!field.surface.triangles.empty())
+    print_row("surface of the body",
+              fmt::format("{} triangles, volume {:.6g}", field.surface.triangles.size(), field.surface.volume()));
 }
 
 void print_tensors(const FieldStatistics& s) {

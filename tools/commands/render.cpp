@@ -201,7 +201,8 @@ void add_render_command(CLI::App& program, Progress& progress) {
       ->add_option("--checkpoint", options->run.keeping.interval,
                    "Seconds after which the work is kept again, in PICTURE.checkpoint (60); 0: only when interrupted")
       ->check(CLI::Range(0.0, 1e9));
-  command->add_flag("--resume", options->run.keeping.resume, "Continue from the checkpoint, if there is one");
+  command->add_flag("--resume", options->run.keeping.resume,
+                    "Be sure to continue: it is an error if there is no checkpoint, or one of another render");
   command->add_option(
       "--shard", options->shard,
       "K/N: do part K of N of the work, from 1 to N, and write it to the file of -o, for `tensorray merge`");

@@ -20,12 +20,15 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
+#include "tools/import/cases/exodus.h"
 #include "tools/import/cases/plot3d.h"
 #include "tools/import/lattice_files/lattice_files.h"
+#include "tools/import/lattices/fill_values.h"
 #include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/flat_mesh.h"
-#include "tools/import/meshes/mesh_boundary.h"
 #include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/surfaces/mesh_boundary.h"
+#include "tools/import/surfaces/triangle_shells.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
@@ -74,6 +77,31 @@ void make_symmetric(TensorGrid& grid) {
   });
 }
 
+void warn_of_fills(const FillValues& fills, std::size_t values, ImportReport& report) {
+  if (fills.count > 0)
+    report.warnings.push_back(
+        fmt::format("{} of {} values are as {:.6g}, which programs write where they have no data; make them NaN, of "
+                    "which the import makes inactive voxels",
+                    fills.count, values, fills.example));
+}
+
+/// Warns of tensors that are all the same, also zero.
+void warn_of_same(const TensorGrid& grid, ImportReport& report) {
+  std::optional<Eigen::Matrix3d> first;
+  std::size_t voxels = 0;
+  for (const TensorBlock& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[offset]) continue;
+      const Eigen::Matrix3d tensor = block.values[offset].cast<double>();
+      if (!first) first = tensor;
+      if ((tensor - *first).norm() > 1e-6 * first->norm()) return;
+      ++voxels;
+    }
+  if (voxels > 1)
+    report.warnings.push_back(first->norm() > 0 ? "all tensors are the same; check the array and the step of time"
+                                                : "all tensors are zero; check the array and the step of time");
+}
+
 TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings, ImportReport& report) {
   if (!settings.boundary.empty()) throw std::invalid_argument("has voxels, which have no body: leave --boundary out");
   if (settings.take == Take::tensor && !settings.array.empty() && lattice.array.empty())
@@ -85,6 +113,7 @@ TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings
   if (settings.sampling.bounds) crop(grid, *settings.sampling.bounds);
   grid.name = lattice.array;
   report.lattice->active = grid.active_voxels();
+  warn_of_fills(report.lattice->fills, report.lattice->voxels, report);
   return grid;
 }
 
@@ -95,6 +124,23 @@ struct SilentVtk {
   SilentVtk() { vtkObject::GlobalWarningDisplayOff(); }
   ~SilentVtk() { vtkObject::SetGlobalWarningDisplay(before); }
 };
+
+/// Gives the grid the surface of the mesh, within the bounds that the user gives.
+void add_surface(vtkDataSet& mesh, const ImportSettings& settings, const Progress& progress, TensorGrid& grid,
+                 ImportReport& report) {
+  constexpr double tolerance = 0.01;  // Of a voxel.
+  progress.update("finding the surface", 0, 1);
+  report.surface = body_surface(mesh, tolerance * report.mesh->voxel.minCoeff());
+  TriangleMesh triangles = std::move(report.surface->mesh);
+  if (report.surface->open_edges > 0) return;
+  grid.surface = std::move(triangles);
+  if (!settings.sampling.bounds) return;
+  Eigen::AlignedBox3d box = *settings.sampling.bounds;
+  if (const int flat = settings.sampling.flat_axis; flat >= 0)  // Of a slab all of the thickness counts.
+    box.min()[flat] = grid.surface.bounds().min()[flat], box.max()[flat] = grid.surface.bounds().max()[flat];
+  grid.surface = cut_to(std::move(grid.surface), box);
+  report.surface->area = 0;
+}
 
 TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportSettings& settings,
                        const Progress& progress, ImportReport& report) {
@@ -109,8 +155,17 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
   progress.update("making tensors", 0, 1);
   const auto mesh = with_tensors(data, array, settings.take, settings.order, settings.cell_values);
   report.mesh.emplace();
+  FillValues fills;
+  vtkDataArray& values = *attributes_of(data, array.of_cells).GetArray(array.name.c_str());
+  std::vector<double> tuple(static_cast<std::size_t>(values.GetNumberOfComponents()));
+  for (vtkIdType i = 0; i < values.GetNumberOfTuples(); ++i) {
+    values.GetTuple(i, tuple.data());
+    fills.add(tuple.data(), values.GetNumberOfComponents());
+  }
+  warn_of_fills(fills, static_cast<std::size_t>(values.GetNumberOfTuples()), report);
   TensorGrid grid = sample_mesh(*mesh, settings.sampling, progress, *report.mesh);
   grid.name = array.name;
+  if (settings.surface && !vtkImageData::SafeDownCast(&data)) add_surface(*mesh, settings, progress, grid, report);
   return grid;
 }
 
@@ -177,6 +232,13 @@ TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, ImportSettings sett
   const bool is_flat = image ? is_flat_across_z(*image) : settings.sampling.flat_axis == 2;
   if (is_flat) pad_vectors(*data);
   const ArrayChoice array = chosen_array(*data, settings, is_flat);
+  if (array.is_at_both)
+    report.notes.push_back(fmt::format("array \"{}\" is at points and at cells: that at {} is taken{}", array.name,
+                                       array.of_cells ? "cells" : "points",
+                                       array.of_cells ? "" : "; --cells constant takes the other one"));
+  if (const int count = attributes_of(*data, array.of_cells).GetArray(array.name.c_str())->GetNumberOfComponents();
+      count > 9)
+    report.notes.push_back(fmt::format("array \"{}\" has {} components: the first six are taken", array.name, count));
   if (!image || wants_sampling(settings)) return import_mesh(*data, array, settings, progress, report);
   data = nullptr;  // Leave the lattice as the only owner of the numbers, so that it can free them.
   vtkSmartPointer<vtkDataArray> values = attributes_of(*image, array.of_cells).GetArray(array.name.c_str());
@@ -206,7 +268,10 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
     throw std::invalid_argument("has one step of time; leave --steps out");
   if (settings.files.size() == 2)
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
-  if (!open) return import_data_set(read_vtk_source(file, settings.step), settings, progress, report);
+  if (!open) {
+    const auto data = read_vtk_source(file, settings.step, &report.notes);
+    return import_data_set(data, settings, progress, report);
+  }
   if (open == open_npy) return import_lattice(placed(open(file), settings), settings, report);
   if (wants_sampling(settings))
     throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
@@ -215,10 +280,22 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   return import_lattice(lattice, settings, report);
 }
 
-/// An error message in one line that names the file.
-std::string about(const std::filesystem::path& file, const std::string& error) {
-  const std::string message = escaped(error);
-  return message.find(file.string()) == std::string::npos ? file.string() + ": " + message : message;
+/// An error message in one line that names the file, with what was found before.
+std::string about(const std::filesystem::path& file, const std::string& error, const ImportReport& report) {
+  std::string message = escaped(error);
+  if (message.find(file.string()) == std::string::npos) message = file.string() + ": " + message;
+  for (const std::string& note : report.notes) message += " (" + escaped(note) + ")";
+  return message;
+}
+
+/// Pieces of one mesh are named by any of them.
+std::vector<std::filesystem::path> without_other_pieces(const std::vector<std::filesystem::path>& files) {
+  if (files.size() < 2) return files;
+  const std::vector<std::filesystem::path> pieces = nemesis_pieces(files.front());
+  const bool is_one = pieces.size() > 1 && std::all_of(files.begin(), files.end(), [&](const auto& file) {
+                        return std::find(pieces.begin(), pieces.end(), file) != pieces.end();
+                      });
+  return is_one ? std::vector{files.front()} : files;
 }
 
 /// Checks that positions of voxels are numbers that differ, and that OpenVDB takes them.
@@ -244,7 +321,9 @@ std::string tensor_name(const std::string& array, Take take) {
 
 }  // namespace
 
-TensorGrid import_tensors(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
+TensorGrid import_tensors(const ImportSettings& given, const Progress& progress, ImportReport& report) {
+  ImportSettings settings = given;
+  settings.files = without_other_pieces(given.files);
   if (settings.files.empty() || settings.files.size() > 2)
     throw std::invalid_argument("give one file, or PLOT3D's two: the grid and its q");
   const std::filesystem::path& file = settings.files.front();
@@ -261,25 +340,32 @@ TensorGrid import_tensors(const ImportSettings& settings, const Progress& progre
   } catch (const Cancelled&) {
     throw;
   } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(about(file, error.what()));
+    throw std::invalid_argument(about(file, error.what(), report));
   } catch (const std::bad_alloc&) {
-    throw std::runtime_error(about(
-        file, "does not fit in memory: it may be damaged, or has many cells; else give --memory, or fewer voxels"));
+    throw std::runtime_error(
+        about(file, "does not fit in memory: it may be damaged, or has many cells; else give --memory, or fewer voxels",
+              report));
   } catch (const std::exception& error) {
-    throw std::runtime_error(about(file, error.what()));
+    throw std::runtime_error(about(file, error.what(), report));
   }
   if (grid.blocks.empty() && settings.sampling.bounds)
     throw std::invalid_argument(file.string() + ": --bounds: no voxel is inside that has a tensor");
-  if (grid.blocks.empty()) throw std::runtime_error(file.string() + ": all voxels are background or not finite");
+  if (grid.blocks.empty())
+    fail(file, report.lattice && report.lattice->non_finite > 0
+                   ? fmt::format("has no tensor: {} of its {} voxels are NaN or infinite, the others zero (background)",
+                                 report.lattice->non_finite, report.lattice->voxels)
+                   : "all voxels are background or not finite");
   require_place(file, grid);
+  warn_of_same(grid, report);
   grid.name = tensor_name(grid.name, settings.take);
   grid.metadata["tensorray:source"] = file.filename().string();
   return grid;
 }
 
 int time_steps(const ImportSettings& settings) {
-  const std::filesystem::path& file = settings.files.front();
-  return settings.files.size() == 1 && !lattice_reader(file) ? time_steps(file) : 1;
+  const std::vector<std::filesystem::path> files = without_other_pieces(settings.files);
+  const std::filesystem::path& file = files.front();
+  return files.size() == 1 && !lattice_reader(file) ? time_steps(file) : 1;
 }
 
 }  // namespace tensorray

@@ -13,11 +13,12 @@
 #include "tools/import/lattices/lattice.h"
 #include "tools/import/meshes/mesh_tensors.h"
 #include "tools/import/sampling/mesh_sampling.h"
+#include "tools/import/surfaces/body_surface.h"
 
 namespace tensorray {
 
 struct ImportSettings {
-  /// One file. For PLOT3D two: the grid file and the q file.
+  /// One file. For PLOT3D two: the grid file and the q file. Of Nemesis, any number of pieces of one mesh.
   std::vector<std::filesystem::path> files;
   std::string array;  ///< Its name, or a list of its components (mesh_tensors.h); empty: the only suitable one.
   Take take = Take::tensor;
@@ -31,6 +32,7 @@ struct ImportSettings {
   std::optional<ComponentFrame> frame;    ///< Axes of the components, where the file does not state them; of RAS files.
   std::optional<int> step;                ///< Of the steps of time, from 0 on; none: the last one.
   std::filesystem::path boundary;         ///< File for the surface of the body; empty: none.
+  bool surface = true;                    ///< Whether the grid of a mesh gets the surface of the body that the mesh is.
 };
 
 /// What was found in the files and how it was converted. Only one of the two reports is filled.
@@ -38,7 +40,10 @@ struct ImportReport {
   std::optional<LatticeReport> lattice;
   std::optional<SamplingReport> mesh;
   std::size_t mesh_cells = 0, boundary_triangles = 0;
-  double thickness = 0;  ///< Of the slab that a flat mesh has become; 0: it was none.
+  std::optional<BodySurface> surface;  ///< Without its triangles, which the grid has.
+  double thickness = 0;                ///< Of the slab that a flat mesh has become; 0: it was none.
+  std::vector<std::string> notes;      ///< Of the mesh: guesses that were made, and what was left out, for the user.
+  std::vector<std::string> warnings;   ///< Of all formats: tensors that are hardly meant.
 };
 
 /// Reads voxels as they are, and samples meshes. The grid gets the array's name, and its source as metadata. VTK's

@@ -73,7 +73,32 @@ def image_of(data, array, resolution):
     return resample.GetOutput()
 
 
-def field_of(image, array):
+def surface_of(data):
+    """The outer surface of cells, as points and triangles; None: of an image, or not closed (flat cells)."""
+    if data.IsA("vtkImageData"):
+        return None
+    from vtkmodules.vtkFiltersCore import vtkCleanPolyData, vtkFeatureEdges, vtkTriangleFilter
+    from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
+    skin, triangles, joined, open_edges = (make() for make in (vtkDataSetSurfaceFilter, vtkTriangleFilter,
+                                                               vtkCleanPolyData, vtkFeatureEdges))
+    skin.SetInputData(data)
+    triangles.SetInputConnection(skin.GetOutputPort())
+    triangles.PassVertsOff()
+    triangles.PassLinesOff()
+    joined.SetInputConnection(triangles.GetOutputPort())
+    joined.SetTolerance(1e-9)
+    open_edges.SetInputConnection(joined.GetOutputPort())
+    open_edges.FeatureEdgesOff()
+    open_edges.ManifoldEdgesOff()
+    open_edges.Update()
+    surface = joined.GetOutput()
+    if surface.GetNumberOfPolys() == 0 or open_edges.GetOutput().GetNumberOfCells() > 0:
+        return None
+    return (numpy_support.vtk_to_numpy(surface.GetPoints().GetData()).astype(float),
+            numpy_support.vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3))
+
+
+def field_of(image, array, surface=None):
     """The tensors at the points of an image, without a copy if they have nine components."""
     values = numpy_support.vtk_to_numpy(image.GetPointData().GetArray(array))
     if values.ndim != 2 or values.shape[1] not in (6, 9):
@@ -89,7 +114,7 @@ def field_of(image, array):
     to_world[:3, :3] = [[axes.GetElement(i, j) * image.GetSpacing()[j] for j in range(3)] for i in range(3)]
     first = np.array(image.GetExtent()[::2], float)
     to_world[:3, 3] = np.array(image.GetOrigin()) + to_world[:3, :3] @ first
-    return tr.Field(values.reshape(nz, ny, nx, 3, 3), to_world=to_world, name=array)
+    return tr.Field(values.reshape(nz, ny, nx, 3, 3), to_world=to_world, name=array, surface=surface)
 
 
 def vtk_points(positions):
@@ -209,7 +234,8 @@ class BentLight(VTKPythonAlgorithmBase):
     def RequestData(self, request, inputs, outputs):
         blocks = blocks_of(vtkDataObject.GetData(inputs[0]))
         array = self._array or first_tensor(blocks)
-        field = field_of(image_of(one_data_set(blocks, array), array, self._resolution), array)
+        data = one_data_set(blocks, array)
+        field = field_of(image_of(data, array, self._resolution), array, surface_of(data))
         scene = {"field": {"scale": self._scale} if self._scale else {},
                  "light": {"direction": self._direction}, "receiver": {"resolution": self._pixels},
                  "integrator": {"type": "photon_distribution"}}

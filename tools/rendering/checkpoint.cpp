@@ -4,6 +4,7 @@
 #include <chrono>
 #include <exception>
 #include <iterator>
+#include <new>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -11,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "base/process/seconds.h"
+#include "base/text/path_text.h"
 #include "base/text/text.h"
 #include "scenes/jobs/work_file.h"
 #include "tools/command_line/interrupts.h"
@@ -25,9 +27,14 @@ constexpr double longest_tick = 0.2, watch_interval = 5;  // Seconds: a signal i
 /// @throw SceneError unless the file is of this scene.
 WorkFile read_work_of(const std::filesystem::path& file, const Scene& scene, const std::string& fix) {
   WorkFile work = read_work(file);
-  if (const std::string other = difference(work.origin, origin_of(scene)); !other.empty())
-    throw SceneError(printable(fmt::format("{}: is of another render: {}; {}", file.string(), other, fix)));
+  if (const std::string other = difference(work.origin, origin_of(scene, work.is_complete)); !other.empty())
+    throw SceneError(printable(fmt::format("{}: is of another render: {}{}", file.string(), other, fix)));
   return work;
+}
+
+bool is_there(const std::filesystem::path& file) {
+  std::error_code none;
+  return !file.empty() && std::filesystem::exists(file, none);
 }
 
 bool is_light(const std::pair<const std::string, Result>& result) {
@@ -37,13 +44,11 @@ bool is_light(const std::pair<const std::string, Result>& result) {
 bool has_light(const Results& results) { return std::any_of(results.begin(), results.end(), is_light); }
 
 Results read_checkpoint(const std::filesystem::path& file, const RenderRun& run, const Scene& scene) {
-  std::error_code none;
-  if (!run.keeping.resume || file.empty() || !std::filesystem::exists(file, none)) return {};
-  WorkFile work = read_work_of(file, scene, "undo the change, or remove the file");
+  WorkFile work = read_work_of(file, scene, run.keeping.resume ? "; undo the change, or leave --resume out" : "");
   const WorkPart part = run.keeping.shard.value_or(WorkPart{});
   if (work.part.index != part.index || work.part.count != part.count)
-    throw SceneError(printable(fmt::format("{}: is part {} of {} of the render; give its --shard, or remove the file",
-                                           file.string(), work.part.index + 1, work.part.count)));
+    throw SceneError(printable(fmt::format("{}: is part {} of {} of the render; give its --shard", file.string(),
+                                           work.part.index + 1, work.part.count)));
   return std::move(work.results);
 }
 
@@ -51,21 +56,35 @@ Results read_checkpoint(const std::filesystem::path& file, const RenderRun& run,
 
 std::filesystem::path checkpoint_file(const SceneDescription& description, const RunKeeping& keeping) {
   std::filesystem::path file = checkpoint_of(description, keeping);
-  std::error_code none;
-  if (!keeping.resume && !file.empty() && std::filesystem::exists(file, none))
-    throw SceneError(
-        printable(fmt::format("{}: is the checkpoint of a render that did not end; continue it with --resume, "
-                              "or remove the file",
-                              file.string())));
+  if (keeping.resume && !is_there(file))
+    throw SceneError(printable(fmt::format("--resume: there is no checkpoint {}; leave --resume out", file.string())));
   return file;
 }
 
+void set_aside(const std::filesystem::path& checkpoint, const std::string& why, bool quiet) {
+  std::filesystem::path name = checkpoint;
+  for (int i = 1; is_there(name); ++i) name = with_suffix(checkpoint, fmt::format(".{}", i));
+  std::filesystem::rename(checkpoint, name);
+  tell({fmt::format("note: {}; it is kept as {}", escaped(why), name.string())}, quiet);
+}
+
 EarlierResults read_earlier(const std::filesystem::path& checkpoint, const RenderRun& run, const Scene& scene) {
-  EarlierResults earlier{read_checkpoint(checkpoint, run, scene), {}};
-  if (!earlier.results.empty()) earlier.file = checkpoint;
+  EarlierResults earlier;
+  try {
+    if (is_there(checkpoint)) earlier.results = read_checkpoint(checkpoint, run, scene);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    if (run.keeping.resume) throw;
+    set_aside(checkpoint, error.what(), run.quiet);
+  }
+  if (!earlier.results.empty()) {
+    earlier.file = checkpoint;
+    tell({"continues from " + checkpoint.string()}, run.quiet);
+  }
   const std::filesystem::path& light = run.keeping.light;
   if (light.empty() || has_light(earlier.results)) return earlier;
-  const WorkFile other = read_work_of(light, scene, "undo the change, or leave --light out");
+  const WorkFile other = read_work_of(light, scene, "; undo the change, or leave --light out");
   if (!has_light(other.results))
     tell({fmt::format("note: {} has no light, because it was made quickly, or because another shard is the first one; "
                       "it is made again",
@@ -96,7 +115,7 @@ Checkpoint::~Checkpoint() {
 }
 
 WorkFile Checkpoint::work_file() {
-  if (!origin_) origin_ = origin_of(scene_);
+  if (!origin_) origin_ = origin_of(scene_, false);
   return {*origin_, std::filesystem::absolute(scene_.description.path), job_.part(), false, job_.results()};
 }
 
@@ -104,6 +123,8 @@ WorkFile Checkpoint::shard() {
   const std::lock_guard lock(writing_);
   WorkFile file = work_file();
   file.is_complete = true;
+  const Json hashed = origin_of(scene_);  // Shards are put together on other machines, too.
+  if (difference(file.origin, hashed).empty()) file.origin = hashed;
   if (job_.part().index == 0) return file;
   for (auto result = file.results.begin();
        result != file.results.end();)  // All shards have it: the first one keeps it.
@@ -123,8 +144,7 @@ bool Checkpoint::write() {
     if (!has_failed_) tell({fmt::format("warning: no checkpoint: {}", escaped(error.what()))}, false);
     has_failed_ = true;
   }
-  std::error_code none;
-  return is_written_ || std::filesystem::exists(file_, none);
+  return is_written_ || is_there(file_);
 }
 
 void Checkpoint::remove() {
@@ -134,18 +154,12 @@ void Checkpoint::remove() {
   file_.clear();  // The thread may be about to write.
 }
 
-/// Finds what the work belongs to while the files are those that were loaded.
-void Checkpoint::find_origin() {
-  const std::lock_guard lock(writing_);
-  if (origin_ || file_.empty()) return;
-  try {
-    origin_ = origin_of(scene_);
+void Checkpoint::run() {
+  try {  // While the files are those that were loaded.
+    const std::lock_guard lock(writing_);
+    if (!file_.empty() && !origin_) origin_ = origin_of(scene_, false);
   } catch (const std::exception&) {  // write() reports it.
   }
-}
-
-void Checkpoint::run() {
-  find_origin();
   const double interval = keeping_.interval;
   const std::chrono::duration<double> tick(interval > 0 ? std::min(longest_tick, interval / 2) : longest_tick);
   Clock::time_point written = Clock::now(), shown = written;

@@ -15,8 +15,8 @@
 
 namespace tensorray {
 
-/// Where the run keeps its work; empty: nowhere. @throw SceneError if there is a checkpoint that the run does not
-/// continue.
+/// Where the run keeps its work; empty: nowhere. @throw SceneError if the run must continue, and there is no
+/// checkpoint.
 std::filesystem::path checkpoint_file(const SceneDescription& description, const RunKeeping& keeping);
 
 /// What a run begins with.
@@ -25,8 +25,12 @@ struct EarlierResults {
   std::filesystem::path file;  ///< Where they are from; empty if there are none.
 };
 
-/// Those of the checkpoint, if the run continues one, and light of the file that --light names, if the checkpoint has
-/// none. Says it if that file has none, either. @throw SceneError if one of the two is of another render; as read_work.
+/// Gives a checkpoint that a run cannot use another name, and says it. @param why  With the file's name.
+void set_aside(const std::filesystem::path& checkpoint, const std::string& why, bool quiet);
+
+/// Those of the checkpoint, and light of the file that --light names, if the checkpoint has none. Says both, and if
+/// that file has no light. A checkpoint of another render is set aside, unless the run must continue.
+/// @throw SceneError if one of the two is of another render; as read_work.
 EarlierResults read_earlier(const std::filesystem::path& checkpoint, const RenderRun& run, const Scene& scene);
 
 /// While it lives, a thread writes the work of a render to a checkpoint, and asks the work for pictures, after each
@@ -55,7 +59,6 @@ class Checkpoint {
  private:
   void run();
   WorkFile work_file();
-  void find_origin();
 
   const Scene& scene_;
   Job& job_;

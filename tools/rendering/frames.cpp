@@ -106,7 +106,10 @@ class Sequence {
       if (common.contains("scale")) set_chosen(common, description);
       bound_memory_of(run_, description);
       tell({fmt::format("frame {}", frame)}, run_.quiet);
-      Scene rendered = render_to_files(description, at_frame(run_, frame), std::exchange(loaded_, {}), progress_);
+      RenderRun run = at_frame(run_, frame);
+      // Frames that were not begun have no checkpoint.
+      run.keeping.resume &= std::filesystem::exists(checkpoint_of(description, run.keeping));
+      Scene rendered = render_to_files(description, run, std::exchange(loaded_, {}), progress_);
       loaded_.emplace(std::move(rendered));
     } catch (const Cancelled&) {
       throw;

@@ -68,7 +68,7 @@ std::string run_statistics(const Scene& scene, const Statistics& statistics, dou
 /// picture so far, if there is one.
 Render render_or_keep(const Scene& scene, RenderJob& job, Checkpoint& checkpoint, const Progress& progress) {
   const auto kept = [&] {
-    return checkpoint.write() ? "--resume continues from " + checkpoint.file().string() : std::string();
+    return checkpoint.write() ? "the same command continues from " + checkpoint.file().string() : std::string();
   };
   Render result;
   try {
@@ -99,7 +99,7 @@ void write_or_keep(const Scene& scene, const Render& result, Checkpoint& checkpo
     commit_outputs(std::move(files));
   } catch (const std::exception&) {  // The disk may be full.
     if (checkpoint.write())
-      tell({"the work is kept: --resume continues from " + checkpoint.file().string()}, run.quiet);
+      tell({"the work is kept: the same command continues from " + checkpoint.file().string()}, run.quiet);
     throw;
   }
 }
@@ -111,7 +111,7 @@ struct RunFiles {
   std::filesystem::path earlier;     ///< Of the results that it begins with; empty: there are none.
 };
 
-/// Renders the job and writes all files.
+/// Renders the job and writes all files. @throw DamagedArchive if the checkpoint cannot be used, and need not.
 void complete(const Scene& scene, RenderJob& job, RunFiles files, const RenderRun& run, Progress& progress) {
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
   const std::future<void> images =  // Errors come with the first image.
@@ -132,12 +132,24 @@ void complete(const Scene& scene, RenderJob& job, RunFiles files, const RenderRu
     for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
     write_or_keep(scene, result, checkpoint, std::move(files.outputs), run);
   } catch (const DamagedArchive& error) {
-    if (files.earlier.empty()) throw;
+    const bool may_begin_anew = files.earlier == files.checkpoint && !run.keeping.resume && !run.ranks;
+    if (files.earlier.empty() || may_begin_anew) throw;
     fail(files.earlier, error.what());
   }
   checkpoint.remove();
   for (const std::filesystem::path& each : written_by(scene.description, run))
     if (!run.quiet) tell_made("wrote " + each.string());
+}
+
+/// Renders what the checkpoint, if there is one, has not.
+void continue_or_begin(const Scene& scene, RunFiles files, const RenderRun& run, Progress& progress) {
+  EarlierResults earlier = read_earlier(files.checkpoint, run, scene);
+  if (run.ranks) agree(*run.ranks, scene, earlier.results);
+  files.earlier = earlier.file;
+  RenderJob job(run.keeping.shard.value_or(WorkPart{}), std::move(earlier.results));
+  job.is_shard = run.keeping.shard.has_value();
+  job.ranks = run.ranks;
+  complete(scene, job, std::move(files), run, progress);
 }
 
 }  // namespace
@@ -151,18 +163,19 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
                       Progress& progress) {
   // First: a folder that cannot be written is named for the picture.
   RunFiles files{open_files(description, run), checkpoint_file(description, run.keeping), {}};
+  const std::filesystem::path checkpoint = files.checkpoint;
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
   if (run.ranks) send_scene(*run.ranks, description, run);
   Scene scene = load(description, loaded, progress);
   bar.reset();
   tell(scene.notes, run.quiet);
-  EarlierResults earlier = read_earlier(files.checkpoint, run, scene);
-  if (run.ranks) agree(*run.ranks, scene, earlier.results);
-  files.earlier = earlier.file;
-  RenderJob job(run.keeping.shard.value_or(WorkPart{}), std::move(earlier.results));
-  job.is_shard = run.keeping.shard.has_value();
-  job.ranks = run.ranks;
-  complete(scene, job, std::move(files), run, progress);
+  try {
+    continue_or_begin(scene, std::move(files), run, progress);
+  } catch (const DamagedArchive& error) {  // Its header is right, but what follows is not what these outputs need.
+    if (checkpoint.empty() || run.ranks || run.keeping.resume) throw;
+    set_aside(checkpoint, checkpoint.string() + ": " + error.what(), run.quiet);
+    continue_or_begin(scene, {open_files(description, run), checkpoint, {}}, run, progress);
+  }
   return scene;
 }
 

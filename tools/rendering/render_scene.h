@@ -19,7 +19,7 @@ namespace tensorray {
 struct RunKeeping {
   bool is_on = true;                 ///< Whether there are checkpoints.
   double interval = 60;              ///< Seconds between checkpoints; 0: only where the run is interrupted.
-  bool resume = false;               ///< Continue from the checkpoint, if there is one.
+  bool resume = false;               ///< It is an error if there is no checkpoint, or one of another render.
   bool watch = false;                ///< Keep the pictures up to date while they are rendered.
   std::optional<WorkPart> shard;     ///< Do only this part of the work,
   std::filesystem::path shard_file;  ///< and write it to this file, and no picture.

@@ -141,14 +141,20 @@ void Pages::close(Id id) {
 }
 
 void Pages::receive(Id id, const std::string& text) {
+  Json message, message_id;
+  std::string wrong;
+  try {
+    message = parsed(text);  // Before the lock: other pages do not wait for a long message.
+  } catch (const std::exception& error) {
+    wrong = error.what();
+  }
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto found =
       std::find_if(pages_.begin(), pages_.end(), [&](const PagePointer& page) { return page->id == id; });
   if (found == pages_.end()) return;
   Page& page = **found;
-  Json message_id;
   try {
-    Json message = parsed(text);
+    if (!wrong.empty()) throw std::invalid_argument(wrong);
     message_id = message.value("id", Json());
     const std::string type = message["type"];
     if (type == "scene") {

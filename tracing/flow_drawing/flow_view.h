@@ -55,9 +55,9 @@ PrincipalStretch principal_stretch(const Eigen::Matrix2d& jacobian);
 /// Immutable; any number of threads may draw. The map must outlive it.
 class FlowView {
  public:
-  static constexpr int tile_size = 16;                ///< Pixels.
-  static constexpr std::size_t tiles_at_once = 2048;  ///< That processes give each other in one message: no more than
-                                                      ///< 700 MB, for pictures with 128 bands.
+  static constexpr int tile_size = 16;               ///< Pixels.
+  static constexpr std::size_t tiles_at_once = 512;  ///< That processes give each other in one message: no more than
+                                                     ///< 200 MB, for pictures with 128 bands.
 
   /// @param ranges   The light that `draw` can draw.
   /// @param samples  `draw` has so many samples of a pixel along x and along y, or one.

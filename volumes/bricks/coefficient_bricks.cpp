@@ -19,7 +19,7 @@ constexpr int block_edge = TensorBlock::size;
 static_assert(CoefficientBlock::width == block_edge, "a brick has the coefficients of a block, and some about it");
 
 int reach_of(const Interpolant& interpolant) {
-  return interpolant.between == Interpolation::linear ? 0 : interpolant.border == Border::fade ? 1 : 2;
+  return interpolant.border == Border::extend ? 2 : interpolant.between == Interpolation::linear ? 0 : 1;
 }
 
 Vector3i place_of(const Vector3i& voxel) {

@@ -49,8 +49,8 @@ struct CoefficientBricks {
   std::size_t count = 0;  ///< Number of the first ones.
   BrickIndex index;       ///< Of all places.
 
-  /// The voxels of each place that have coefficients: the active ones; and of a cubic field inactive ones within the
-  /// extent that are within a voxel of these (`fade`) or two (`extend`) along each axis.
+  /// The voxels of each place that have coefficients: the active ones, and inactive ones within the extent that are
+  /// within a voxel of these (`fade`, of a cubic field) or two (`extend`) along each axis.
   std::vector<VoxelMask> filled;
   std::vector<VoxelMask> active;
 
@@ -61,14 +61,15 @@ struct CoefficientBricks {
 /// Places in slabs across x, in their order: each of at most `most` places, or with one place along x.
 std::vector<PlaceNumbers> slabs_of(const std::vector<Eigen::Vector3i>& places, std::size_t most);
 
-/// @param extent  The box of the active voxels. Runs on all threads.
+/// @param extent  As TensorField::voxels. @param interpolant  Of a linear field, `extend` only if it has a surface.
+/// Runs on all threads.
 CoefficientBricks coefficient_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent,
                                      const Interpolant& interpolant);
 
 /// The coefficients of all voxels, or their values before.
 struct Coefficients {
   const CoefficientBricks& bricks;
-  const Eigen::AlignedBox3i& extent;  ///< The box of the active voxels.
+  const Eigen::AlignedBox3i& extent;  ///< As TensorField::voxels.
   Interpolant interpolant;
   const BrickMemory& blocks;  ///< Of `bricks.places`, in the layout of CoefficientBlock.
 };

@@ -339,7 +339,7 @@ std::optional<double> place_values(const TensorBlock& block, int components, flo
 }
 
 void continue_values(const Coefficients& field) {
-  if (field.interpolant.between == Interpolation::linear) return;
+  if (field.interpolant.between == Interpolation::linear && field.interpolant.border == Border::fade) return;
   // Each sweep leads one voxel further; those beside edges and corners are reached along one axis after the other. A
   // sweep reads only voxels that were known before it.
   std::vector<VoxelMask> known = field.bricks.active, next = known;

@@ -23,7 +23,7 @@ constexpr float min_square = 1e-25f, max_square = 1e30f;
 /// nothing, if the copy is of symmetric tensors and the block is not: T = Tᵀ in all voxels, bit for bit.
 std::optional<double> place_values(const TensorBlock& block, int components, float* values);
 
-/// Continues the values of a cubic field's active voxels to the others that have coefficients, as the mean of all axes
+/// Continues the values of a field's active voxels to the others that have coefficients, as the mean of all axes
 /// that lead to a voxel: with `extend` by a line through two voxels, or the value of a single one; with `fade` a fifth
 /// of the neighbour's value.
 void continue_values(const Coefficients& field);

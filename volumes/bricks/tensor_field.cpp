@@ -22,14 +22,42 @@ struct alignas(64) ZeroBrick {
 };
 constexpr ZeroBrick zero_brick;
 
-Eigen::AlignedBox3d extent_of(const Eigen::AlignedBox3i& active) {
-  Eigen::AlignedBox3d extent(active.min().cast<double>(), active.max().cast<double>());
+Eigen::AlignedBox3d extent_of(const Eigen::AlignedBox3i& voxels) {
+  Eigen::AlignedBox3d extent(voxels.min().cast<double>(), voxels.max().cast<double>());
   for (int axis = 0; axis < 3; ++axis)
-    if (active.sizes()[axis] == 0) {
+    if (voxels.sizes()[axis] == 0) {
       extent.min()[axis] -= 0.5;
       extent.max()[axis] += 0.5;
     }
   return extent;
+}
+
+constexpr double on_voxel = 1e-5;  // A surface that is so near to a voxel's centre, in voxels, ends there.
+
+/// The bounds of a surface in index space; empty: there is none.
+Eigen::AlignedBox3d index_box(const TriangleMesh& surface, const Eigen::Affine3d& to_index) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& vertex : surface.vertices) box.extend(to_index * vertex);
+  return box;
+}
+
+/// The voxels of the extent, where a body has these bounds (TensorField::index_bounds).
+Eigen::AlignedBox3i voxels_of(const Eigen::AlignedBox3i& active, const Eigen::AlignedBox3d& body) {
+  Eigen::AlignedBox3i voxels = active;
+  for (int axis = 0; axis < 3 && !body.isEmpty(); ++axis) {
+    const double low = active.min()[axis], high = active.max()[axis];
+    const double from = body.min()[axis] + on_voxel, to = body.max()[axis] - on_voxel;
+    if (low == high && from > low - 0.5 && to < high + 0.5) continue;
+    voxels.min()[axis] = static_cast<int>(std::clamp(std::floor(from), low - TensorField::most_beyond, low));
+    voxels.max()[axis] = static_cast<int>(std::clamp(std::ceil(to), high, high + TensorField::most_beyond));
+  }
+  return voxels;
+}
+
+/// A linear field without a surface is zero beside active voxels.
+Interpolant used_interpolant(Interpolant interpolant, bool has_surface) {
+  if (interpolant.between == Interpolation::linear && !has_surface) interpolant.border = Border::fade;
+  return interpolant;
 }
 
 /// Reads each block once, on all threads, and places its values. @param norms  Get the greatest squared norms.
@@ -72,17 +100,22 @@ TensorField::TensorField(const TensorGrid& grid, const Interpolant& interpolant)
     : TensorField(view_of(grid), interpolant) {}
 
 TensorField::TensorField(const BlockSource& source, const Interpolant& interpolant)
-    : interpolant_(interpolant), to_world_(source.to_world), to_index_(source.to_world.inverse()) {
+    : interpolant_(interpolant),
+      to_world_(source.to_world),
+      to_index_(source.to_world.inverse()),
+      surface_(std::make_shared<const TriangleMesh>(source.surface)) {
   const Eigen::AlignedBox3i active = active_box(source.shapes);
   if (active.isEmpty()) throw std::invalid_argument("the tensor field has no active voxel");
   if (!to_world_.matrix().allFinite() || !to_index_.matrix().allFinite())
     throw std::invalid_argument("the tensor field's transform cannot be inverted");
-  index_bounds_ = extent_of(active);
-  voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
+  const Eigen::AlignedBox3i voxels = voxels_of(active, index_box(source.surface, to_index_));
+  const Interpolant used = used_interpolant(interpolant, !source.surface.triangles.empty());
+  index_bounds_ = extent_of(voxels);
+  voxels_ = Eigen::AlignedBox3d(voxels.min().cast<double>(), voxels.max().cast<double>());
 
   // Blocks of voxels become those of coefficients, from which bricks are made.
   const BlockTable table(source.shapes);
-  const CoefficientBricks bricks = coefficient_bricks(table, active, interpolant);
+  const CoefficientBricks bricks = coefficient_bricks(table, voxels, used);
   std::vector<double> norms(table.shapes.size());
   BrickMemory blocks;
   for (const int components : {TensorBrick::symmetric, TensorBrick::general}) {  // Any tensors fit the second time.
@@ -91,7 +124,7 @@ TensorField::TensorField(const BlockSource& source, const Interpolant& interpola
     blocks = blocks_within(memory_, bricks);
     if (place_blocks(source, table, bricks, blocks, norms)) break;
   }
-  const Coefficients coefficients{bricks, active, interpolant, blocks};
+  const Coefficients coefficients{bricks, voxels, used, blocks};
   continue_values(coefficients);
   const std::vector<float> strongest = make_coefficients(coefficients, memory_);
   keep_bricks(memory_, bricks.count);
@@ -110,6 +143,7 @@ TensorField::TensorField(FieldParts parts)
       voxels_(parts.voxels.cast<double>()),
       bricks_(std::move(parts.bricks)),
       memory_(std::move(parts.memory)),
+      surface_(std::make_shared<const TriangleMesh>(std::move(parts.surface))),
       max_norm_(parts.max_norm),
       index_(bricks_) {
   index_.set_values(parts.strongest);
@@ -127,6 +161,14 @@ void TensorField::keep_with_bricks(std::shared_ptr<const void> other) {
 }
 
 std::vector<Eigen::Vector3d> TensorField::corners() const { return corners_of(index_bounds_, to_world_); }
+
+double TensorField::surface_beyond() const {
+  const Eigen::AlignedBox3d body = index_box(surface(), to_index_);
+  if (body.isEmpty()) return 0;
+  const double beyond =
+      std::max((index_bounds_.min() - body.min()).maxCoeff(), (body.max() - index_bounds_.max()).maxCoeff());
+  return beyond > on_voxel ? beyond : 0;
+}
 
 Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
 

@@ -24,7 +24,8 @@ enum class Interpolation {
   cubic
 };
 
-/// What `cubic` takes inactive voxels for that are within its reach of active ones.
+/// What inactive voxels are taken for that are within the reach of active ones: in a cubic field, and in a linear one
+/// that has a surface.
 enum class Border {
   fade,   ///< A fifth of the active neighbour's value, then zero: the field fades out over two voxels.
   extend  ///< The continuation of the active voxels' values, so that the field goes on behind the last active voxel.
@@ -70,10 +71,11 @@ struct TensorBrick {
 struct FieldParts {
   Interpolant interpolant;
   Eigen::Affine3d to_world;
-  Eigen::AlignedBox3i voxels;           ///< From the least to the greatest active one.
+  Eigen::AlignedBox3i voxels;           ///< As `TensorField::voxels`.
   std::vector<Eigen::Vector3i> bricks;  ///< As `TensorField::bricks`.
   std::vector<float> strongest;         ///< TensorBrick::strongest of each.
-  BrickMemory memory;                   ///< In the order of `bricks`.
+  TriangleMesh surface;
+  BrickMemory memory;  ///< In the order of `bricks`.
   double max_norm = 0;
 };
 
@@ -97,12 +99,19 @@ class TensorField {
   const Eigen::Affine3d& to_index() const { return to_index_; }
 
   /// The volume's extent in index space: from the least to the greatest active voxel, so that N voxels span N − 1. An
-  /// axis with a single voxel spans that voxel ±½, and the tensor is constant along it.
+  /// axis with a single voxel spans that voxel ±½, and the tensor is constant along it. Where the body's surface
+  /// reaches beyond, it has whole voxels about the surface, at most `most_beyond` of them on each side.
   const Eigen::AlignedBox3d& index_bounds() const { return index_bounds_; }
+  static constexpr int most_beyond = 2;
 
-  /// The box of the centres of the active voxels, index space. It differs from `index_bounds` only along axes with a
-  /// single voxel.
+  /// The box of the voxels' centres, index space. It differs from `index_bounds` only along axes with a single voxel.
   const Eigen::AlignedBox3d& voxels() const { return voxels_; }
+
+  /// The surface of the body that the field is in (TensorGrid::surface).
+  const TriangleMesh& surface() const { return *surface_; }
+
+  /// How far the surface reaches beyond the extent, voxels; 0: it does not.
+  double surface_beyond() const;
 
   /// The eight corners of the extent, world space.
   std::vector<Eigen::Vector3d> corners() const;
@@ -158,6 +167,7 @@ class TensorField {
   Eigen::AlignedBox3d index_bounds_, voxels_;
   std::vector<Eigen::Vector3i> bricks_;
   BrickMemory memory_;  ///< In the order of `bricks_`.
+  std::shared_ptr<const TriangleMesh> surface_;
   std::size_t trailing_offset_ = 0;
   double max_norm_ = 0;
   BrickIndex index_;  ///< Finds a brick, and its TensorBrick::strongest, by its coordinates.

@@ -8,7 +8,11 @@
 namespace tensorray {
 namespace {
 
-bool is_vector(const GridInfo& grid) { return grid.type == "vec3s" || grid.type == "vec3d"; }
+bool is_surface(const GridInfo& grid) {
+  return ends_with(grid.name, "_surface_points") || ends_with(grid.name, "_surface_triangles");
+}
+
+bool is_vector(const GridInfo& grid) { return (grid.type == "vec3s" || grid.type == "vec3d") && !is_surface(grid); }
 bool is_scalar(const GridInfo& grid) { return grid.type == "float" || grid.type == "double"; }
 
 /// A grid of a layout: the ending of its name, and the entries that it holds.

@@ -12,6 +12,7 @@
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "volumes/files/grid_voxels.h"
+#include "volumes/files/surface_grids.h"
 
 namespace tensorray {
 namespace {
@@ -74,8 +75,9 @@ std::vector<FieldGrid> field_grids_of(const VdbFile& file, const FieldGrids& fie
   return grids;
 }
 
+/// Those of the field, and of its surface.
 std::set<std::string> grid_names(const FieldGrids& field) {
-  std::set<std::string> names;
+  std::set<std::string> names = surface_names(field.name);
   for (const FieldPart& part : field.parts) names.insert(part.grid);
   return names;
 }
@@ -90,7 +92,7 @@ BlockSource derived_source(const std::filesystem::path& path, const std::vector<
   });
   const bool is_staggered = grids.front().file.grid->getGridClass() == openvdb::GRID_STAGGERED;
   const Eigen::Matrix3d to_index = field.to_world.inverse().linear();
-  TensorGrid grid{field.name, field.to_world, {}, field.metadata};
+  TensorGrid grid{field.name, field.to_world, {}, field.metadata, field.surface};
   grid.blocks = derive == Derive::hessian ? hessian(samples, to_index)
                 : is_staggered            ? staggered_gradient(samples, to_index)
                                           : gradient(samples, to_index);
@@ -160,6 +162,15 @@ void check_half_range(const std::filesystem::path& path, const TensorGrid& grid)
   });
 }
 
+/// The first active voxel. @param grid  Of tensors, or numbers.
+template <class Grid>
+Eigen::Vector3i first_voxel(const Grid& grid) {
+  for (const auto& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[static_cast<std::size_t>(offset)]) return block.origin + TensorBlock::position(offset);
+  return {0, 0, 0};
+}
+
 openvdb::FloatGrid::Ptr float_grid(const ScalarGrid& grid) {
   const auto result = openvdb::FloatGrid::create();
   for (const ScalarBlock& block : grid.blocks) {
@@ -192,6 +203,7 @@ BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string
   result.metadata = metadata_of(file.metadata, *grids.front().file.grid);
   const bool derives = derive != Derive::none;
   try {
+    result.surface = read_surface(path, file, field.name, result.to_world);
     result.shapes = find_blocks(path, grids, derives ? sizeof(SampleBlock) : min_brick_bytes);
     if (result.shapes.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
     if (derives) return derived_source(path, grids, derive, result);
@@ -219,6 +231,8 @@ void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid,
   if (is_half) check_half_range(path, grid);
   openvdb::GridPtrVec rows;
   for (int row = 0; row < 3; ++row) rows.push_back(std::make_shared<RowGrid>(grid, row, is_half));
+  for (const auto& part : surface_grids(grid.surface, grid.name, grid.to_world, first_voxel(grid)))
+    rows.push_back(part);
   openvdb::MetaMap metadata;
   for (const auto& [key, value] : grid.metadata)
     if (key != length_unit_key) metadata.insertMeta(key, openvdb::StringMetadata(value));
@@ -226,12 +240,14 @@ void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid,
 }
 
 void write_scalar_vdb(const std::filesystem::path& path, const std::vector<ScalarGrid>& grids,
-                      const std::map<std::string, std::string>& metadata) {
+                      const std::map<std::string, std::string>& metadata, const TriangleMesh& surface) {
   openvdb::initialize();
   openvdb::MetaMap of_file;
   for (const auto& [key, value] : metadata) of_file.insertMeta(key, openvdb::StringMetadata(value));
   openvdb::GridPtrVec all;
   for (const ScalarGrid& grid : grids) all.push_back(float_grid(grid));
+  for (const ScalarGrid& grid : grids)
+    for (const auto& part : surface_grids(surface, grid.name, grid.to_world, first_voxel(grid))) all.push_back(part);
   write_vdb(path, all, of_file);
 }
 

@@ -56,7 +56,7 @@ BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& 
 }
 
 BlockSource view_of(const TensorGrid& grid) {
-  BlockSource source{grid.name, grid.to_world, grid.shapes(), grid.metadata, {}};
+  BlockSource source{grid.name, grid.to_world, grid.shapes(), grid.metadata, grid.surface, {}};
   source.fill = [&grid](std::size_t i, TensorBlock& block) { block.values = grid.blocks[i].values; };
   return source;
 }
@@ -73,6 +73,7 @@ TensorGrid to_grid(const BlockSource& source) {
   grid.name = source.name;
   grid.to_world = source.to_world;
   grid.metadata = source.metadata;
+  grid.surface = source.surface;
   grid.blocks = unset_blocks(source.shapes.size());
   tbb::parallel_for(std::size_t{0}, source.shapes.size(),
                     [&](std::size_t i) { read_block(source, i, grid.blocks[i]); });

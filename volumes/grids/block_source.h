@@ -12,13 +12,14 @@
 
 namespace tensorray {
 
-/// A sparse grid of tensors whose blocks are made when they are needed. Name, transform and metadata are those of a
-/// TensorGrid.
+/// A sparse grid of tensors whose blocks are made when they are needed. Name, transform, metadata and surface are
+/// those of a TensorGrid.
 struct BlockSource {
   std::string name = "tensor";
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
   std::vector<BlockShape> shapes;  ///< Each has at least one active voxel; ordered by origin (x, y, z).
   std::map<std::string, std::string> metadata;
+  TriangleMesh surface;
 
   /// Writes the values of the active voxels of block i to `block`, whose shape is set and whose other voxels are zero.
   /// Any thread may call it, any number of times. @throw std::runtime_error that names the file.

@@ -14,6 +14,7 @@
 
 #include <Eigen/Geometry>
 
+#include "base/geometry/triangle_mesh.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
@@ -61,6 +62,7 @@ struct TensorGrid {
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();  ///< From index to world space; invertible.
   TensorBlocks blocks;                          ///< Each has at least one active voxel; ordered by origin (x, y, z).
   std::map<std::string, std::string> metadata;  ///< `tensorray:field`, `tensorray:units`, `tensorray:source`, ...
+  TriangleMesh surface;  ///< Of the body that the field is in, closed, outwards, world; empty: none.
 
   std::vector<BlockShape> shapes() const;  ///< Of all blocks, in their order.
   std::size_t active_voxels() const { return tensorray::active_voxels(shapes()); }

@@ -1,5 +1,7 @@
 // EnSight's cases, as its manual describes them: Gold, in ASCII.
 
+#include <tuple>
+
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 #include <vtkCellData.h>
@@ -85,6 +87,30 @@ TEST(EnSight, TensorsHaveTheirOrderWithoutBeingTold) {
   EXPECT_LT((tensor_of(folder / "a.case", "general") - general).norm(), 1e-3);
 }
 
+TEST(EnSight, NamesInQuotesMayHaveBlanks) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  const std::string sound = bytes_of(folder / "a.case");
+  std::filesystem::create_directory(folder / "my data");
+  std::filesystem::copy_file(folder / "a.geo", folder / "my data/the mesh.geo");
+  for (const char* time : {"0", "1"})
+    std::filesystem::copy_file(folder / ("a." + std::string(time) + ".gen"),
+                               folder / ("my data/the general." + std::string(time)));
+  for (const auto& [model, array, name, file] :
+       {std::tuple("\"a.geo\"", "general", "general", "\"a.*.gen\""),
+        {"\"my data/the mesh.geo\"", "\"my tensor\"", "my_tensor", "\"my data/the general.*\""}}) {
+    std::string text = sound;
+    text.replace(text.find("a.geo"), 5, model);
+    text.replace(text.find("general a.*.gen"), 15, std::string(array) + "   " + file);
+    write_bytes(folder / "a.case", text);
+    EXPECT_EQ(time_steps(folder / "a.case"), 2);
+    for (const int step : {0, 1}) EXPECT_NEAR(tensor_of(folder / "a.case", name, step)(0, 0), 100 * step + 11, 1e-4);
+    EXPECT_NEAR(tensor_of(folder / "a.case", "symmetric")(0, 1), 12, 1e-4);
+  }
+  std::filesystem::remove(folder / "my data/the mesh.geo");
+  EXPECT_NE(read_error(folder / "a.case").find("the mesh.geo: is missing"), std::string::npos);
+}
+
 TEST(EnSight, StepsOfTime) {
   const TemporaryFolder folder;
   write_case(folder);
@@ -120,7 +146,7 @@ TEST(EnSight, DescriptionsAnnounceNothing) {
 
 TEST(EnSight, WhatIsCutOffOrMissingIsNamed) {
   const TemporaryFolder folder;
-  const auto error = [&] { return read_error(folder / "a.case"); };
+  const auto error = [&] { return read_error(folder / "a.case", 1); };
   write_case(folder);
   const std::string sound = bytes_of(folder / "a.case");
   const auto damage = [&](const std::string& from, const std::string& to) {

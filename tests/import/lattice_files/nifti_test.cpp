@@ -77,6 +77,31 @@ Affine3d oblique(double sign) {
 
 const Matrix3d flip_x = Vector3d(-1, 1, 1).asDiagonal();
 
+/// dipy's quadratic form, as nibabel writes an array (X, Y, Z, 3, 3): by columns, in the axes of the voxels.
+TEST(Nifti, MatricesAlongTwoAxesAreInTheAxesOfTheVoxelsAndItIsSaid) {
+  const Matrix3d T = (Matrix3d() << 1, 2, 3, 4, 5, 6, 7, 8, 10).finished();
+  for (const double sign : {1, -1}) {
+    const Affine3d transform = oblique(sign);
+    nifti_1_header header = header_of({2, 3, 2}, 3, transform);
+    header.dim[0] = 5, header.dim[5] = 3;
+    std::vector<float> columns;
+    for (int i = 0; i < 9; ++i) columns.push_back(static_cast<float>(T(i % 3, i / 3)));
+    const test::TemporaryFile file("five.nii",
+                                   file_of(header, volumes_of({2, 3, 2}, [&](const Vector3i&) { return columns; })));
+    const Matrix3d F = axes_of(ComponentFrame::voxels, transform.linear());
+    for (const bool is_ras : {false, true}) {
+      Lattice lattice = open_nifti(file);
+      if (is_ras) take_frame(lattice, ComponentFrame::ras);
+      LatticeReport report;
+      const TensorGrid grid = tensors_of(lattice, {}, report);
+      const Matrix3d expected = is_ras ? T : Matrix3d(F * T * F.transpose());
+      for (const Vector3i& index : {Vector3i(0, 0, 0), Vector3i(1, 2, 1)})
+        EXPECT_LT((test::voxel(grid, index)->cast<double>() - expected).norm(), 1e-5) << sign << is_ras;
+      EXPECT_EQ(report.notes.size(), is_ras ? 0u : 1u);
+    }
+  }
+}
+
 TEST(Nifti, BrainHasItsFacts) {
   const auto path = data_file("brain_dti/tensorLAS.nii.gz");
   SKIP_WITHOUT(path);
@@ -168,6 +193,21 @@ TEST(Nifti, FilesWithoutAnOrientationAreTakenAsFslTakesAnalyze) {
   // FSL does not flip such an image: the components are in the axes of the voxels, of which the first one points left.
   test::expect_near((Matrix3d() << 1, -0.2, -0.1, -0.2, 0.6, 0.05, -0.1, 0.05, 0.3).finished(),
                     test::voxel(grid, {1, 0, 0}));
+}
+
+/// Of nine components and of vectors, nothing tells the axes; no tensor can be made of eigenvectors.
+TEST(Nifti, GuessesAreSaidAndEigenvectorsAreRefused) {
+  const auto note_of = [](const std::vector<float>& components) {
+    const auto file_bytes = file_of(header_of({2, 2, 2}, static_cast<int>(components.size()), Affine3d::Identity()),
+                                    volumes_of({2, 2, 2}, [&](const Vector3i&) { return components; }));
+    const test::TemporaryFile file("guess.nii", file_bytes);
+    LatticeReport report;
+    tensors_of(open_nifti(file), std::nullopt, report);
+    return report.notes.empty() ? "" : report.notes[0];
+  };
+  EXPECT_NE(note_of(std::vector<float>(9, 1)).find("taken as those of the scanner (RAS); --frame"), std::string::npos);
+  test::expect_error([&] { note_of({0.6f, 0, -0.8f}); }, {"vectors of length 1", "dti_V1", "--save_tensor"});
+  test::expect_error([&] { note_of({0.6f, 0, -0.7f}); }, {"derive a tensor (--gradient-of)"});
 }
 
 TEST(Nifti, SlopeAndInterceptAreApplied) {

@@ -55,6 +55,20 @@ TEST(ComponentArrays, AnArrayWithCommasInItsNameIsNoList) {
   EXPECT_FALSE(is_array_list(*mesh, "sxx,syy"));
 }
 
+TEST(ComponentArrays, NamesInAListMayHaveCommas) {
+  for (const std::string form : {"S,@", "S, @", "S,stress,@", "@,"}) {
+    const Grid mesh = cube_with_components(symmetric);
+    std::string list;
+    for (const std::string each : {"xx", "yy", "zz", "xy", "yz", "xz"}) {
+      std::string name = form;
+      mesh->GetPointData()->GetArray(("s" + each).c_str())->SetName(name.replace(name.find('@'), 1, each).c_str());
+      list += (list.empty() ? "" : form == "S,@" ? "," : " , ") + name;
+    }
+    EXPECT_TRUE(is_array_list(*mesh, list));
+    expect_tensors(*mesh, list, TensorOrder::vtk, symmetric);
+  }
+}
+
 TEST(ComponentArrays, ErrorsNameTheArrayAndListTheOthers) {
   const Grid mesh = cube_with_components(symmetric);
   add_array<3>(*mesh, "v", [](const Vector3d& p) { return p; });

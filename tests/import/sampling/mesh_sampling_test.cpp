@@ -243,7 +243,7 @@ TEST(MeshSampling, RefusesWhatCannotBeSampled) {
   add_array<9>(*cube, tensor_array, [](const Vector3d&) {
     return Eigen::Matrix<double, 9, 1>(Eigen::Matrix<double, 9, 1>::Constant(std::nan("")));
   });
-  refuses(resolution(3), "none of the 3 x 3 x 3 voxels");
+  refuses(resolution(3), "all 8 points have NaN or infinite tensors");
 }
 
 }  // namespace

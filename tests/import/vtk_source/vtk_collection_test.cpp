@@ -83,6 +83,30 @@ TEST(VtkCollection, APartThatIsNamedTwiceForOneTimeCountsOnceOrIsRefused) {
   EXPECT_NE(read_error(folder / "both.vtm").find("names the same mesh twice"), std::string::npos);
 }
 
+TEST(VtkCollection, OfASeriesOfFilesEachIsAStep) {
+  const TemporaryFolder folder;
+  const auto file_series = [](const std::string& files) {
+    return "{\n  \"file-series-version\" : \"1.0\",\n  \"files\" : [" + files + "]\n}\n";
+  };
+  for (int i = 1; i <= 3; ++i) write_xml(*bar(0, i), folder / (std::to_string(i) + ".vtu"));
+  write_bytes(folder / "a.vtu.series",
+              file_series("{\"name\": \"3.vtu\", \"time\": 1.5}, {\"name\": \"1.vtu\", \"time\": "
+                          "-1}, {\"name\": \"./2.vtu\", \"time\": 1}"));
+  EXPECT_EQ(time_steps(folder / "a.vtu.series"), 3);
+  for (const int step : {0, 1, 2})
+    EXPECT_EQ(read_vtk_source(folder / "a.vtu.series", step)->GetNumberOfCells(), step + 1);
+  EXPECT_EQ(read_vtk_source(folder / "a.vtu.series")->GetNumberOfCells(), 3);
+  for (const auto& [text, error] : {std::pair(file_series(""), "names no files"),
+                                    {file_series("{\"time\": 1}"), "names no files"},
+                                    {file_series("{\"name\": \"4.vtu\"}"), "4.vtu: does not exist"},
+                                    {file_series("{\"name\": \"a.vtu.series\"}"), "names the collection"},
+                                    {std::string("[1, 2"), "is not a series of files"}}) {
+    write_bytes(folder / "a.vtu.series", text);
+    EXPECT_NE(read_error(folder / "a.vtu.series").find(error), std::string::npos)
+        << read_error(folder / "a.vtu.series");
+  }
+}
+
 TEST(VtkCollection, ErrorsNameTheFile) {
   const TemporaryFolder folder;
   write_xml(*bar(0, 1), folder / "a.vtu");

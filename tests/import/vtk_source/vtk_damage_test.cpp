@@ -48,6 +48,16 @@ TEST_F(VtkDamage, FilesThatAreNotWhatTheirEndingSays) {
     EXPECT_THAT(error(name, ""), HasSubstr("is empty"));
   }
   EXPECT_THAT(read_error(folder_ / "none.vtk"), HasSubstr("does not exist"));
+  for (const auto& [name, words] : {std::pair("a.odb", "odb2vtk"),
+                                    {"a.rst", "ansys-mapdl-reader"},
+                                    {"a.mgz", "mri_convert"},
+                                    {"a.FIB.gz", "dtifit --save_tensor"},
+                                    {"a.mnc", "mnc2nii"},
+                                    {"a.cas.h5", "EnSight Gold"},
+                                    {"a.stl", "is a surface"},
+                                    {"a.vdb", "needs no import"}})
+    EXPECT_THAT(error(name, "\x1f\x8b of any kind"), AllOf(HasSubstr(name), HasSubstr(words)));
+  EXPECT_THAT(error("a.mnc", "CDF\x01 of any kind"), HasSubstr("mnc2nii"));
   EXPECT_THAT(error("surface.vtk", "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n"),
               HasSubstr("surfaces"));
   EXPECT_THAT(error("surface.vtp", "<VTKFile type=\"Poly\nData\x1b\"></VTKFile>"), HasSubstr("'Poly\\nData\\x1b'"));

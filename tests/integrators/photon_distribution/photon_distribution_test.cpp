@@ -46,7 +46,7 @@ PhotonDistribution distribute(const Bench& bench, const std::vector<LightChannel
 
 Matrix3d zero(const Vector3d&) { return Matrix3d::Zero(); }
 
-std::uint64_t emitted(const EndCounts& counts) {
+std::uint64_t ended(const EndCounts& counts) {
   std::uint64_t sum = 0;
   for (const std::uint64_t count : counts) sum += count;
   return sum;
@@ -65,7 +65,8 @@ TEST(PhotonDistribution, EveryRayIsAccountedFor) {
     const Plate& plate = *bench.geometry.surfaces().plate;
     for (int channel = 0; channel < 4; ++channel) {
       const EndCounts& ends = light.ends[channel];
-      EXPECT_EQ(emitted(ends), light.positions);
+      EXPECT_EQ(light.emitted[channel], light.positions);
+      EXPECT_EQ(ended(ends), light.emitted[channel]);
       for (const RayEnd end : {RayEnd::plate, RayEnd::missed, RayEnd::obstacle})
         EXPECT_GT(ends[static_cast<int>(end)], 0u) << to_string(end);
       double on_film = 0;
@@ -118,7 +119,7 @@ TEST(PhotonDistribution, SomeChannelsPerPhotonEstimateTheSame) {
   const PhotonDistribution some = distribute(bench, channels(8), settings);
   EXPECT_EQ(some.positions, 40000u);
   for (int channel = 0; channel < 8; ++channel) {
-    EXPECT_NEAR(static_cast<double>(emitted(some.ends[channel])), 10000, 100);
+    EXPECT_NEAR(static_cast<double>(some.emitted[channel]), 10000, 100);
     double difference = 0, sum = 0;
     for (std::size_t i = 0; i < all.plane_size(); ++i) {
       difference += std::abs(all.plane(channel)[i] - some.irradiance.plane(channel)[i]);

@@ -55,6 +55,7 @@ class KeptWork : public Program {
       kill(child, signal);
       Outcome outcome = wait_for(child);
       if (outcome.status != 0) return outcome;
+      for (const char* picture : {"a.png", "a.exr"}) std::filesystem::remove(in_folder(picture));
     }
   }
 
@@ -104,7 +105,7 @@ TEST_P(DividedWork, ThatIsKilledContinuesToTheSameFiles) {
   make(GetParam());
   EXPECT_EQ(end_by(SIGKILL, {"--threads", "1"}).status, 128 + SIGKILL);
   EXPECT_FALSE(is_equal("a.png", "whole.png"));
-  EXPECT_EQ(end_by(SIGKILL, {"--resume", "--threads", "1"}).status, 128 + SIGKILL);
+  EXPECT_EQ(end_by(SIGKILL, {"--threads", "1"}).status, 128 + SIGKILL);
   run_well(render("a", {"--resume"}));
   expect_same("a");
   EXPECT_FALSE(has("a.png.checkpoint"));
@@ -154,7 +155,7 @@ TEST_F(KeptWork, AnInterruptedRenderWritesWhatItHas) {
     std::filesystem::remove(in_folder("a.png.checkpoint"));  // The first one is written when tiles are done.
     const Outcome outcome = end_by(signal);
     EXPECT_EQ(outcome.status, 130);
-    EXPECT_NE(outcome.error.find("--resume continues from"), std::string::npos) << outcome.error;
+    EXPECT_NE(outcome.error.find("the same command continues from"), std::string::npos) << outcome.error;
     EXPECT_TRUE(has("a.png") && has("a.exr"));
     EXPECT_FALSE(is_equal("a.exr", "whole.exr"));
   }
@@ -169,9 +170,53 @@ TEST_F(KeptWork, ARequestWritesAPictureAndTheRenderGoesOn) {
   }
 }
 
-TEST_F(KeptWork, ACheckpointOfAnotherRenderIsRefused) {
+/// The same scene continues by itself and says so in one line; that of another scene stays under another name.
+TEST_F(KeptWork, ACheckpointIsContinuedOrSetAside) {
+  const auto loud = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = render("a", more);
+    arguments.erase(std::find(arguments.begin(), arguments.end(), "-q"));
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, 0) << outcome.error;
+    return outcome.error;
+  };
   end_by(SIGKILL);
-  expect_error("continue it with --resume", render("a"));
+  const std::string kept = read_file(in_folder("a.png.checkpoint"));
+  EXPECT_NE(loud({}).find("/a.png.checkpoint\n"), std::string::npos);
+  expect_same("a");
+  EXPECT_FALSE(has("a.png.checkpoint"));
+  EXPECT_EQ(loud({}).find("checkpoint"), std::string::npos);
+  for (const char* name : {"a.png.checkpoint.1", "a.png.checkpoint.2"}) {
+    write("a.png.checkpoint", kept);
+    const std::string said = loud({"--seed", "7"});
+    EXPECT_NE(said.find("`/seed` is not given there, 7 here; it is kept as " + in_folder(name).string()),
+              std::string::npos)
+        << said;
+    EXPECT_FALSE(is_equal("a.exr", "whole.exr"));
+    EXPECT_TRUE(read_file(in_folder(name)) == kept);
+  }
+  WorkFile forged = read_work(in_folder("a.png.checkpoint.1"));
+  for (auto& [name, result] : forged.results) result = std::make_shared<const std::string>("of another size");
+  for (const std::string& bytes : {std::string("no checkpoint"), kept.substr(0, kept.size() / 2), std::string()}) {
+    write("a.png.checkpoint", bytes);
+    if (bytes.empty()) write_work(in_folder("a.png.checkpoint"), forged);
+    EXPECT_NE(loud({}).find("it is kept as "), std::string::npos);
+    expect_same("a");
+  }
+}
+
+/// Large files are known by size and time: to continue does not read them again. Small ones may be copied.
+TEST_F(KeptWork, AFileThatChangedIsNoticed) {
+  end_by(SIGKILL);
+  const std::filesystem::path field = in_folder("field.vdb");
+  std::filesystem::last_write_time(field, std::filesystem::last_write_time(field) + std::chrono::seconds(5));
+  EXPECT_EQ(read_work(in_folder("a.png.checkpoint")).origin["files"]["`/field/file`"].count("hash"), 1u);
+  run_well(render("a", {"--resume"}));
+  expect_same("a");
+}
+
+TEST_F(KeptWork, ACheckpointOfAnotherRenderIsRefusedWhereItMustBeContinued) {
+  expect_error("--resume: there is no checkpoint ", render("a", {"--resume"}));
+  end_by(SIGKILL);
   expect_error("`/seed` is not given there, 7 here", render("a", {"--resume", "--seed", "7"}));
   expect_error("`/camera/resolution`", render("a", {"--resume", "--set", "camera.resolution=[9,9]"}));
   expect_error("method is", render("a", {"--resume", "--set", "integrator.type=lens"}));

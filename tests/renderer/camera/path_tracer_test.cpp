@@ -1,12 +1,15 @@
 #include "renderer/camera/path_tracer.h"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <numeric>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include <Eigen/LU>
@@ -332,6 +335,27 @@ TEST(PictureTest, PartsThatStopAndContinueGiveTheSamePicture) {
   Job damaged({}, {{"tile 3", std::make_shared<const std::string>("short")}});
   callbacks.job = &damaged;
   EXPECT_THROW(render_surfaces(world.scene, camera(40), settings, callbacks), DamagedArchive);
+}
+
+/// Within a tile: it stays as it was.
+TEST(PictureTest, IsCancelledWithinATile) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = settings.max_samples = 1 << 20;
+  std::atomic<bool> cancelled{false};
+  Job job;
+  RenderCallbacks callbacks;
+  callbacks.cancelled = &cancelled;
+  callbacks.job = &job;
+  callbacks.progress = [&](std::uint64_t, std::uint64_t) { job.stopping = true; };
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    cancelled = true;
+  });
+  for (const PixelState& pixel : render_surfaces(world.scene, camera(40), settings, callbacks).pixels)
+    EXPECT_EQ(pixel.samples, 0);
+  later.join();
+  EXPECT_TRUE(job.results().empty());
 }
 
 TEST(PictureTest, AdaptiveSamplingKeepsTheMeanAndWorksWhereItIsNoisy) {

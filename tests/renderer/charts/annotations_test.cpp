@@ -104,5 +104,22 @@ TEST(AnnotationsTest, StripShowsItsColors) {
   for (std::size_t i = 0; i < reds.size(); ++i) EXPECT_NEAR(reds[i], (static_cast<double>(i) + 0.5) / 100, 1e-6);
 }
 
+/// Dashes of 5.5 pixels, which go on from stroke to stroke.
+TEST(AnnotationsTest, HiddenLinesAreDashed) {
+  for (const bool hidden : {false, true}) {
+    Image image = blank(300, 200, 1);
+    draw_outline(image,
+                 {{{20, 50}, {152, 50}, false}, {{20, 100.5}, {64, 100.5}, true}, {{64, 100.5}, {152, 100.5}, true}},
+                 true, hidden);
+    const auto ink = [&](int y) {
+      double sum = 0;
+      for (int x = 0; x < 300; ++x) sum += 1 - image.pixel(x, y)[0];
+      return sum;
+    };
+    EXPECT_NEAR(ink(49), 132, 2);
+    EXPECT_NEAR(ink(100), hidden ? 66 : 0, hidden ? 12 : 1e-9);  // Each dash has round ends.
+  }
+}
+
 }  // namespace
 }  // namespace tensorray

@@ -209,7 +209,9 @@ TEST(AreaPhotonsTest, PowerIsThatOfTheLampTowardsTheVolume) {
   const double h = height - half_height, root = std::sqrt(half_size * half_size + h * h);
   const double projected = 4 * half_size / root * std::atan(half_size / root);  // Four quarters of the upper face.
   EXPECT_NEAR(power, 7 * side * side * projected, 0.02 * power);
-  EXPECT_EQ(photons.counts[0][0] + photons.counts[0][1] + photons.counts[0][2] + photons.counts[0][3], 40000u * bands);
+  const auto& [emitted, ends] = photons.counts[0];
+  EXPECT_EQ(emitted, 40000u * bands);
+  EXPECT_EQ(ends[0] + ends[1] + ends[2] + ends[3], emitted);
   ASSERT_TRUE(photons.areas[0]);
   EXPECT_EQ(photons.areas[0]->count, 40000);
 }

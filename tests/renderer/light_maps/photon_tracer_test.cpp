@@ -1,5 +1,6 @@
 #include "renderer/light_maps/photon_tracer.h"
 
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <numeric>
@@ -103,7 +104,7 @@ TEST(PhotonTracerTest, TheSunsPowerIsThatOfTheSilhouette) {
   const Vector3d direction = Vector3d(0.4, 0.3, -1).normalized();
   const double silhouette = direction.cwiseAbs().sum();
   const PhotonMaps photons = traced(ClearCube(0.5), floor, {sun(3 * direction)}, settings_of(1000, 2));
-  EXPECT_EQ(photons.counts, std::vector<PhotonCounts>(2, {0, 1000 * traced_bands, 0, 0}));
+  EXPECT_EQ(photons.counts, std::vector<PhotonCounts>(2, {1000 * traced_bands, {0, 1000 * traced_bands, 0, 0}}));
   EXPECT_NEAR(power_in(photons, 0), 0.5 * 2 * silhouette, 1e-6);
   EXPECT_NEAR(power_in(photons, 1), 0.5 * 3 * silhouette, 1e-6);
 }
@@ -161,21 +162,43 @@ TEST(PhotonTracerTest, KeptPhotonsThatAreNoneAreRefused) {
   EXPECT_THROW(trace_with([](Photon& photon) { photon.light = 1; }), DamagedArchive);
 }
 
+/// Within a chunk: no photon starts afterwards.
+TEST(PhotonTracerTest, IsCancelledBetweenPhotons) {
+  struct CancellingCube : ClearCube {
+    explicit CancellingCube(Progress& progress) : progress_(progress) {}
+    void trace_importance(std::vector<BentRay>& rays) const override {
+      ClearCube::trace_importance(rays);
+      progress_.cancelled = ++positions == 10;
+    }
+    mutable std::atomic<int> positions{0};
+    Progress& progress_;
+  };
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  Progress progress;
+  const CancellingCube cube(progress);
+  EXPECT_THROW(trace_photons(cube, corners_of({Vector3d::Constant(-0.5), Vector3d::Constant(0.5)}), floor_at(-0.8, 4),
+                             {sun({0, 0, -1})}, settings_of(4000), progress),
+               Cancelled);
+  EXPECT_EQ(cube.positions, 10);
+}
+
 /// Before the region, behind it, beside everything, and within it.
 TEST(PhotonTracerTest, EveryPhotonEnds) {
   const PhotonMaps photons =
       traced(ClearCube(1, true), floor_at(-0.8, 0.5, true), {sun({0, 0, -1})}, settings_of(4000, 3));
   ASSERT_EQ(photons.counts.size(), 3u);
-  for (const PhotonCounts& counts : photons.counts)
-    EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}), 4000u * traced_bands);
+  for (const PhotonCounts& counts : photons.counts) {
+    EXPECT_EQ(counts.emitted, 4000u * traced_bands);
+    EXPECT_EQ(std::accumulate(counts.ends.begin(), counts.ends.end(), std::uint64_t{0}), counts.emitted);
+  }
   const auto part = [&](PhotonEnd end) {
-    return static_cast<double>(photons.counts[0][static_cast<std::size_t>(end)]) / (4000.0 * traced_bands);
+    return static_cast<double>(photons.counts[0].ends[static_cast<std::size_t>(end)]) / (4000.0 * traced_bands);
   };
   EXPECT_NEAR(part(PhotonEnd::before), 0.5, 0.02);  // The roof, at x > 0; the rest is stopped.
   EXPECT_NEAR(part(PhotonEnd::stopped), 0.5, 0.02);
   const PhotonMaps open = traced(ClearCube(), floor_at(-0.8, 0.5), {sun({0, 0, -1})}, settings_of(4000));
-  EXPECT_NEAR(static_cast<double>(open.counts[0][1]) / (4000.0 * traced_bands), 0.25, 0.01);
-  EXPECT_NEAR(static_cast<double>(open.counts[0][2]) / (4000.0 * traced_bands), 0.75, 0.01);
+  EXPECT_NEAR(static_cast<double>(open.counts[0].ends[1]) / (4000.0 * traced_bands), 0.25, 0.01);
+  EXPECT_NEAR(static_cast<double>(open.counts[0].ends[2]) / (4000.0 * traced_bands), 0.75, 0.01);
 }
 
 /// A region that bends nothing: photons give the irradiance of straight light, within the region and behind it.
@@ -310,7 +333,7 @@ TEST(PhotonTracerTest, APointWithinTheRegionShinesAllAround) {
     const double height = z + 0.8, part = (1 - height / std::hypot(height, size / 2)) / 2;
     const SurfaceScene floor = floor_at(-0.8, size);
     const PhotonMaps photons = traced(ClearCube(), floor, {point}, settings_of(count, 8, 0.1));
-    const double landed = static_cast<double>(photons.counts[0][static_cast<std::size_t>(PhotonEnd::landed)]) /
+    const double landed = static_cast<double>(photons.counts[0].ends[static_cast<std::size_t>(PhotonEnd::landed)]) /
                           static_cast<double>(count * traced_bands);
     if (z < 0.5) {  // From above, light that passes the cube is left to others.
       EXPECT_GT(landed, part - 0.006);

@@ -33,7 +33,7 @@ class TurningBall : public BendingRegion {
     for (BentRay& ray : rays) {
       ray.position += entry(ray.position, ray.direction) * ray.direction;
       ray.direction = Eigen::AngleAxisd(angle_ * (1 + ray.band), Vector3d::UnitZ()) * ray.direction;
-      ray.arrives = true;
+      ray.arrives = ray.band != lost_band;
       ray.radiance_scale = radiance_scale_;
     }
   }
@@ -46,6 +46,8 @@ class TurningBall : public BendingRegion {
       ray.arrives = true;
     }
   }
+
+  int lost_band = -1;  ///< Its light does not arrive.
 
  private:
   double angle_, radiance_scale_;
@@ -166,6 +168,21 @@ TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
   }
   EXPECT_GT(bent, 50);
   EXPECT_LT(bent, 290);
+}
+
+/// Rays that do not arrive count as 0 in the sums, and not in the means.
+TEST(BendingRegionTest, MeansAreOfTheRaysThatArrive) {
+  Stage stage({ConstantLight{even(1)}});
+  TurningBall ball(0.01, 1.5);
+  ball.lost_band = 3;
+  stage.scene.region = &ball;
+  stage.scene.bands_per_view = bands;
+  RayShader shader(stage.scene, {});
+  shader.shade({{{0, -3, 0}, {0, 1, 0}, {3, 0, 0, 0}}}, true);
+  const BentView view = shader.view(0).bent.value();
+  EXPECT_EQ(view.arrives, 0.75);
+  EXPECT_NEAR(view.radiance_scale / view.arrives, 1.5, 1e-12);
+  EXPECT_NEAR(view.deflection / view.arrives, 0.01 * (1 + 2 + 3) / 3, 1e-9);
 }
 
 /// A directional light reaches no surface through the region, because landed light has it; the camera still sees it.

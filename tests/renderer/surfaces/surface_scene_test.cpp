@@ -325,5 +325,31 @@ TEST(SurfaceSceneTest, BadSurfacesAreNamed) {
   EXPECT_EQ(error(bad), "surface 1: strand_ends must ascend to the number of points");
 }
 
+/// The same rays end there alone, together and on their way to a light.
+TEST(SurfaceSceneTest, ATranslucentSurfaceIsMetByAPartOfTheRays) {
+  std::vector<ShadedSurface> surfaces(2);
+  surfaces[0].shape = rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2});
+  surfaces[1].shape = rectangle_mesh({0, 0, -1}, {1, 0, 0}, {0, 1, 0}, {4, 4});
+  surfaces[0].opacity = 0.3f;
+  const SurfaceScene scene(std::move(surfaces));
+  for (const double height : {3.0, 30.0}) {
+    std::vector<StraightRay> rays;
+    for (int i = 0; i < 40000; ++i) {
+      const Vector3d place(i % 200 / 101.0 - 0.97, i / 200 / 101.0 - 0.97, 0), from(0, 0, height);
+      rays.push_back({from, (place - from).normalized()});
+    }
+    std::vector<std::optional<SurfaceHit>> hits;
+    scene.intersect(rays, hits);
+    int met = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const auto& [from, direction] = rays[i];
+      EXPECT_EQ(scene.intersect(from, direction)->surface, hits[i]->surface);
+      EXPECT_EQ(scene.occluded(from, direction, height + 0.6), hits[i]->surface == 0);
+      met += hits[i]->surface == 0 ? 1 : 0;
+    }
+    EXPECT_NEAR(met / 40000.0, 0.3, 4 * std::sqrt(0.3 * 0.7 / 40000)) << height;
+  }
+}
+
 }  // namespace
 }  // namespace tensorray

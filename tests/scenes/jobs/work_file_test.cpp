@@ -60,6 +60,23 @@ TEST(WorkFileTest, WhatBelongsToNoRenderIsRefused) {
   }
 }
 
+/// By their hashes where both have one, else by size and time.
+TEST(WorkFileTest, FilesAreTheSameBySizeTimeAndHash) {
+  const auto with = [](const Json& file) {
+    Json origin = right_work().origin;
+    origin["files"]["`/field/file`"] = file;
+    return origin;
+  };
+  const Json whole{{"size", 3}, {"time", 5}, {"hash", "a"}}, copy{{"size", 3}, {"time", 6}, {"hash", "a"}};
+  const Json changed{{"size", 3}, {"time", 5}, {"hash", "b"}}, large{{"size", 3}, {"time", 5}};
+  const Json later{{"size", 3}, {"time", 6}}, longer{{"size", 4}, {"time", 5}};
+  for (const auto& [there, here] : {std::pair(whole, copy), {large, large}, {large, whole}, {whole, large}})
+    EXPECT_EQ(difference(with(there), with(here)), "") << there << here;
+  for (const auto& [there, here] : {std::pair(whole, changed), {large, later}, {large, longer}, {large, copy}})
+    EXPECT_EQ(difference(with(there), with(here)), "the file `/field/file` has other contents") << there << here;
+  EXPECT_NE(difference(right_work().origin, with(large)), "");
+}
+
 /// Every byte that is missing or changed.
 TEST(WorkFileTest, WhatIsDamagedIsRefused) {
   const TemporaryFolder folder;

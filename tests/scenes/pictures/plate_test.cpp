@@ -86,6 +86,32 @@ TEST_F(PlatePicture, IsSeenAlongTheLightAnywhere) {
   EXPECT_NEAR(column_of_light({"receiver.size=[4000,4000]", "receiver.distance=1e4"}), 16, 0.2);
 }
 
+/// Light is counted where it starts and where it ends.
+TEST_F(PlatePicture, BalancesWithEveryMethodAndEnd) {
+  const auto sum_of_ends = [](const nlohmann::json& counts) {
+    double sum = counts["deposited"].get<double>() + counts["missed"].get<double>() + counts.value("side", 0.0);
+    for (const auto& [reason, stopped] : counts["stopped"].items()) sum += stopped.get<double>();
+    return sum;
+  };
+  const std::vector<Settings> cases{{"integrator.density.kind=mesh"},
+                                    {"integrator.density.kind=mesh", "integrator.side_light=false"},
+                                    {"integrator.density.kind=gaussian", "integrator.side_light=false"},
+                                    {"integrator.density.kind=histogram", "bending.max_steps=20"},
+                                    {"integrator.type=lens"}};
+  for (Settings settings : cases) {
+    settings.push_back("field.scale=20");
+    render(settings);
+    const double emitted = statistics_["photons"]["emitted"].get<double>();
+    EXPECT_GT(emitted, 0) << settings[0];
+    EXPECT_EQ(sum_of_ends(statistics_["photons"]), emitted) << settings[0];
+    for (const auto& channel : statistics_["channels"])
+      EXPECT_EQ(sum_of_ends(channel["rays"]), channel["rays"]["emitted"].get<double>()) << settings[0];
+    if (!statistics_.contains("power")) continue;
+    const double power = statistics_["power"]["emitted"].get<double>();
+    EXPECT_NEAR(sum_of_ends(statistics_["power"]), power, 1e-6 * power) << settings[0];
+  }
+}
+
 TEST_F(PlatePicture, HasStatisticsThatBalance) {
   render({"field.scale=20"});
   const nlohmann::json& stats = statistics_;

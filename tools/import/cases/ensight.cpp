@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iomanip>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -19,6 +20,7 @@
 #include <vtkSmartPointer.h>
 
 #include "base/errors.h"
+#include "base/files/temporary_folder.h"
 #include "base/text/short_lines.h"
 #include "base/text/text.h"
 #include "tools/import/vtk/vtk_data_sets.h"
@@ -109,13 +111,20 @@ int take_set(std::vector<std::string>& words) {
   return set == 0 ? 1 : set;
 }
 
+/// The words of a value. Those in quotes may have blanks.
+std::vector<std::string> words_of(const std::string& value) {
+  std::istringstream stream(value);
+  std::vector<std::string> words;
+  for (std::string word; stream >> std::quoted(word, '"', '\0');) words.push_back(word);
+  return words;
+}
+
 /// The file of an entry "[TIME SET] [FILE SET] [DESCRIPTION] FILE"; empty if its name is not known.
 fs::path file_of(const Entry& entry, const std::map<int, TimeSet>& sets, float time) {
-  std::istringstream stream(entry.value);
-  std::vector<std::string> words{std::istream_iterator<std::string>(stream), {}};
+  std::vector<std::string> words = words_of(entry.value);
   const int set = take_set(words);
   const bool has_description = entry.section == "VARIABLE";
-  if (words.size() < (has_description ? 2u : 1u) || entry.value.find('"') != std::string::npos) return {};
+  if (words.size() < (has_description ? 2u : 1u)) return {};
   std::string name = words[has_description ? 1 : 0];
   const std::size_t begin = name.find('*'), count = static_cast<std::size_t>(std::count(name.begin(), name.end(), '*'));
   if (count == 0) return name;
@@ -177,24 +186,63 @@ bool begins_with(const fs::path& path, const std::string& text) {
   return head.find(text) != std::string::npos;
 }
 
+/// The names of files that a word may mean: asterisks stand for a number.
+std::vector<std::string> names_like(const fs::path& folder, const std::string& word) {
+  const std::size_t first = word.find('*'), last = word.rfind('*');
+  if (first == std::string::npos) return {word};
+  const fs::path parent = fs::path(word).parent_path();
+  std::vector<std::string> names;
+  std::error_code none;
+  for (fs::directory_iterator file(fs::absolute(folder / parent), none), end; file != end; ++file) {
+    const std::string name = (parent / file->path().filename()).string();
+    if (starts_with(name, word.substr(0, first)) && ends_with(name, word.substr(last + 1))) names.push_back(name);
+  }
+  return names;
+}
+
 /// VTK also opens files of kinds that are not imported: of measured points, and of complex numbers.
 void require_no_devices(const Entry& entry, const fs::path& folder) {
-  std::istringstream words(entry.value);
-  for (std::string word; words >> word;) {
-    const fs::path named = folder / word;
-    const std::string name = named.filename().string();
-    const std::size_t first = name.find('*'), last = name.rfind('*');
-    if (first == std::string::npos) {
-      require_no_device(named);
+  for (const std::string& word : words_of(entry.value))
+    for (const std::string& name : names_like(folder, word)) require_no_device(folder / name);
+}
+
+/// A word without quotes, blanks and folders.
+std::string plain_word(std::string word) {
+  const auto is_other = [](char c) { return c == '"' || c == ' ' || c == '\t' || c == '/' || c == '\\'; };
+  std::replace_if(word.begin(), word.end(), is_other, '_');
+  return word;
+}
+
+/// The case for VTK, which does not read names in quotes: a copy with plain ones, and with links to the files, in
+/// `folder`.
+fs::path plain_case(const fs::path& path, const fs::path& folder) {
+  std::ifstream given(path, std::ios::binary);
+  if (std::find(std::istreambuf_iterator<char>(given), {}, '"') == std::istreambuf_iterator<char>())
+    return fs::absolute(path);
+  given.clear();
+  given.seekg(0);
+  std::ofstream copy(folder / "plain.case", std::ios::binary);
+  const fs::path parent = fs::absolute(path).parent_path();
+  bool has_names = false;
+  for (std::string line; std::getline(given, line);) {
+    const std::string text = trimmed(line.substr(0, line.find('#')));
+    const std::size_t colon = text.find(':');
+    if (colon == std::string::npos) has_names = text == "GEOMETRY" || text == "VARIABLE" || (has_names && text.empty());
+    if (!has_names || colon == std::string::npos) {
+      copy << line << "\n";
       continue;
     }
-    std::error_code none;
-    for (fs::directory_iterator file(fs::absolute(named).parent_path(), none), end; file != end; ++file) {
-      const std::string other = file->path().filename().string();
-      if (starts_with(other, name.substr(0, first)) && ends_with(other, name.substr(last + 1)))
-        require_no_device(file->path());
+    copy << text.substr(0, colon + 1);
+    for (const std::string& word : words_of(text.substr(colon + 1))) {
+      copy << " " << plain_word(word);
+      std::error_code none;
+      for (const std::string& name : names_like(parent, word))
+        if (fs::is_regular_file(parent / name, none))
+          fs::create_symlink(parent / name, folder / plain_word(name), none);
     }
+    copy << "\n";
   }
+  return folder / "plain.case";
 }
 
 /// The readers of text take time, and memory, for as many points and cells as a part announces. @throw
@@ -248,8 +296,9 @@ void check_ends(const EnSightCase& given, vtkDataObject& read) {
 
 vtkSmartPointer<vtkDataObject> read_step(const fs::path& path, std::size_t step) {
   const EnSightCase given = ensight_case(path, step);
+  const TemporaryFolder folder;
   vtkNew<vtkGenericEnSightReader> reader;
-  reader->SetCaseFileName(fs::absolute(path).c_str());
+  reader->SetCaseFileName(plain_case(path, folder / "").c_str());
   reader->UpdateInformation();
   reader->ReadAllVariablesOn();
   if (!given.times.empty()) reader->SetTimeValue(given.times[step]);

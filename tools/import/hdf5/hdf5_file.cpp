@@ -1,6 +1,7 @@
 #include "tools/import/hdf5/hdf5_file.h"
 
 #include <algorithm>
+#include <cstring>
 #include <stdexcept>
 #include <utility>
 
@@ -49,6 +50,34 @@ std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
 /// @param file  -1: there is no such attribute.
 Id open_attribute(hid_t file, const std::string& object, const std::string& attribute) {
   return {file < 0 ? -1 : H5Aopen_by_name(file, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose};
+}
+
+/// Whether all numbers are the dataset's fill value.
+bool is_only_fill(hid_t data, hid_t memory_type, vtkDataArray& array) {
+  const Id creation(H5Dget_create_plist(data), H5Pclose);
+  const auto size = static_cast<std::size_t>(array.GetDataTypeSize());
+  std::string fill(size, '\0');
+  H5Pget_fill_value(creation, memory_type, fill.data());
+  const auto* const bytes = static_cast<const char*>(array.GetVoidPointer(0));
+  for (vtkIdType i = 0; i < array.GetNumberOfTuples(); ++i)
+    if (std::memcmp(bytes + static_cast<std::size_t>(i) * size, fill.data(), size) != 0) return false;
+  return true;
+}
+
+/// Whether a part was written: its first chunk, if the dataset is in chunks.
+bool is_written(hid_t data, const HyperSlab& part) {
+  H5D_space_status_t status = H5D_SPACE_STATUS_ALLOCATED;
+  H5Dget_space_status(data, &status);
+  if (status != H5D_SPACE_STATUS_PART_ALLOCATED) return status == H5D_SPACE_STATUS_ALLOCATED;
+  const Id creation(H5Dget_create_plist(data), H5Pclose);
+  const std::size_t rank = part.start.size();
+  std::vector<hsize_t> chunk(rank, 1), corner(rank);
+  H5Pget_chunk(creation, static_cast<int>(rank), chunk.data());
+  for (std::size_t i = 0; i < rank; ++i) corner[i] = part.start[i] / chunk[i] * chunk[i];
+  unsigned filters = 0;
+  haddr_t address = HADDR_UNDEF;
+  hsize_t size = 0;
+  return H5Dget_chunk_info_by_coord(data, corner.data(), &filters, &address, &size) < 0 || address != HADDR_UNDEF;
 }
 
 }  // namespace
@@ -100,10 +129,66 @@ std::vector<std::string> Hdf5File::children(const std::string& group) const {
   return names;
 }
 
+/// Names the file that a link on the way leads to, if there is one.
+void Hdf5File::fail_missing(const std::string& dataset) const {
+  for (std::size_t end = dataset.find('/', 1);; end = dataset.find('/', end + 1)) {
+    const std::string part = dataset.substr(0, end);
+    H5L_info_t link{};
+    if (H5Lget_info(file_->id, part.c_str(), &link, H5P_DEFAULT) >= 0 && link.type == H5L_TYPE_EXTERNAL) {
+      std::string value(link.u.val_size, '\0');
+      const char *file = "", *object = "";
+      H5Lget_val(file_->id, part.c_str(), value.data(), value.size(), H5P_DEFAULT);
+      H5Lunpack_elink_val(value.data(), value.size(), nullptr, &file, &object);
+      fail("its " + part + " is " + object + " in the file " + file +
+           ", which is missing or lacks it; copy it there too");
+    }
+    if (end == std::string::npos) fail("has no dataset " + dataset);
+  }
+}
+
+/// Of a dataset whose numbers are elsewhere: in datasets of other files (a virtual one), or in other files.
+void Hdf5File::require_sources(const std::string& dataset, int depth) const {
+  const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
+  const Id creation(H5Dget_create_plist(data), H5Pclose);
+  H5D_space_status_t status = H5D_SPACE_STATUS_ALLOCATED;
+  H5Dget_space_status(data, &status);
+  if (depth > 0 && status == H5D_SPACE_STATUS_NOT_ALLOCATED)
+    fail("its dataset " + dataset + " was announced, and not written; write it again");
+  std::vector<char> name(4096), source_name(4096);
+  for (int i = 0; i < H5Pget_external_count(creation); ++i) {
+    off_t offset = 0;
+    hsize_t size = 0;
+    H5Pget_external(creation, static_cast<unsigned>(i), name.size() - 1, name.data(), &offset, &size);
+    std::error_code none;
+    const auto held = std::filesystem::file_size(path_.parent_path() / name.data(), none);
+    if (none || (size != H5S_UNLIMITED && held < static_cast<hsize_t>(offset) + size))
+      fail("the numbers of its dataset " + dataset + " are in the file " + name.data() +
+           ", which is missing or cut off; copy it there too");
+  }
+  std::size_t count = 0;
+  if (H5Pget_layout(creation) != H5D_VIRTUAL || H5Pget_virtual_count(creation, &count) < 0) return;
+  if (depth > 8) fail("its dataset " + dataset + " is virtual, and refers to itself");
+  for (std::size_t i = 0; i < count; ++i) {
+    H5Pget_virtual_filename(creation, i, name.data(), name.size());
+    H5Pget_virtual_dsetname(creation, i, source_name.data(), source_name.size());
+    const std::string file = name.data(), source = source_name.data();
+    if ((file + source).find('%') != std::string::npos) continue;  // Of any number of files.
+    const std::string lacks =
+        "its dataset " + dataset + " is virtual, and its source " + (file == "." ? "" : "is the file " + file + ", ");
+    std::filesystem::path there = file == "." ? path_ : path_.parent_path() / file;
+    if (!std::filesystem::exists(there)) there = path_.parent_path() / std::filesystem::path(file).filename();
+    if (!std::filesystem::exists(there)) fail(lacks + "which is missing; copy it there too");
+    const Hdf5File of_source(there);
+    if (!of_source.has(source)) fail(lacks + "which has no dataset " + source + "; write it again");
+    of_source.require_sources(source, depth + 1);
+  }
+}
+
 std::vector<std::uint64_t> Hdf5File::shape(const std::string& dataset) const {
-  if (!has(dataset)) fail("has no dataset " + dataset);
+  if (!has(dataset)) fail_missing(dataset);
   const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
   const Id space(data < 0 ? -1 : H5Dget_space(data), H5Sclose);
+  if (space < 0 && H5Oexists_by_name(file_->id, dataset.c_str(), H5P_DEFAULT) <= 0) fail_missing(dataset);
   if (space < 0) fail("its " + dataset + " is no dataset");
   const int rank = H5Sget_simple_extent_ndims(space);
   std::vector<hsize_t> extents(static_cast<std::size_t>(std::max(0, rank)));
@@ -130,7 +215,10 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const H
     if (part.count[i] > 0 && count > ~std::uint64_t{0} / part.count[i]) fail("its dataset " + dataset + " is damaged");
     count *= part.count[i];
   }
-  const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
+  require_sources(dataset, 0);
+  const Id access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
+  H5Pset_efile_prefix(access, "${ORIGIN}");  // Its other files are beside it.
+  const Id data(H5Dopen2(file_->id, dataset.c_str(), access), H5Dclose);
   const Id space(H5Dget_space(data), H5Sclose), type(H5Dget_type(data), H5Tclose);
   auto [array, memory_type] = array_for(type);
   if (!array) fail("its dataset " + dataset + " has no numbers");
@@ -144,6 +232,8 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const H
   if (H5Dread(data, memory_type, memory, space, H5P_DEFAULT, array->GetVoidPointer(0)) < 0)
     fail("its dataset " + dataset +
          " cannot be read: damaged, cut off, or compressed by a filter that is not installed");
+  if (is_only_fill(data, memory_type, *array) && !is_written(data, part))
+    fail("its dataset " + dataset + " was announced, and not written there; write it again");
   return array;
 }
 

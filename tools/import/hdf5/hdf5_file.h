@@ -37,7 +37,9 @@ class Hdf5File {
   std::vector<std::uint64_t> shape(const std::string& dataset) const;
 
   /// The numbers of a dataset, or of a part of it, in their order: float or double as in the file, integers as
-  /// vtkIdType. One component. Checks that the part is inside the dataset before it allocates memory.
+  /// vtkIdType. One component. Checks that the part is inside the dataset before it allocates memory. Numbers that HDF5
+  /// would make up are an error: of virtual datasets whose sources are missing, and where nothing of the part was
+  /// written.
   vtkSmartPointer<vtkDataArray> read(const std::string& dataset) const;
   vtkSmartPointer<vtkDataArray> read(const std::string& dataset, const HyperSlab& part) const;
 
@@ -46,6 +48,8 @@ class Hdf5File {
 
  private:
   [[noreturn]] void fail(const std::string& what) const;
+  [[noreturn]] void fail_missing(const std::string& dataset) const;
+  void require_sources(const std::string& dataset, int depth) const;
 
   struct Handle;
   std::filesystem::path path_;

@@ -23,6 +23,7 @@
 #include "base/text/text.h"
 #include "tools/import/hdf5/hdf5_file.h"
 #include "tools/import/hdf5/hdf5_meshes.h"
+#include "tools/import/vtk/polyhedra.h"
 
 namespace tensorray {
 namespace {
@@ -95,6 +96,7 @@ struct Part {
   std::uint64_t first_point = 0, first_cell = 0, first_id = 0;  ///< Of the geometry.
   std::uint64_t first_offset = 0;                               ///< Each part has one more than it has cells.
   std::uint64_t point_value = 0, cell_value = 0;                ///< Of parts before it at this step.
+  std::uint64_t index = 0;                                      ///< Among all parts of the file.
 };
 
 std::vector<Part> parts_at(const File& file, int step) {
@@ -118,6 +120,7 @@ std::vector<Part> parts_at(const File& file, int step) {
     next.points = file.number("NumberOfPoints", i, 0);
     next.cells = file.number("NumberOfCells", i, 0);
     next.ids = file.number("NumberOfConnectivityIds", i, 0);
+    next.index = i;
     parts.push_back(next);
     next.first_point += next.points;
     next.first_cell += next.cells;
@@ -127,6 +130,37 @@ std::vector<Part> parts_at(const File& file, int step) {
     next.cell_value += next.cells;
   }
   return parts;
+}
+
+/// Rows of a list of integers.
+std::vector<vtkIdType> integers(const File& file, const std::string& name, std::uint64_t first, std::uint64_t count) {
+  const Array rows = file.rows(name, first, count);
+  auto* const array = vtkIdTypeArray::SafeDownCast(rows);
+  if (!array) fail(file.path, "is damaged: its " + name + " are no integers");
+  return {array->GetPointer(0), array->GetPointer(0) + array->GetNumberOfValues()};
+}
+
+/// Sets the cells of a grid that may have polyhedra. Lists of offsets have one more for each part, which is 0.
+void set_cells(const File& file, const Part& part, vtkUnsignedCharArray& types, vtkCellArray& cells,
+               vtkUnstructuredGrid& grid) {
+  const unsigned char* const first = types.GetPointer(0);
+  if (std::count(first, first + types.GetNumberOfValues(), VTK_POLYHEDRON) == 0) return grid.SetCells(&types, &cells);
+  std::uint64_t faces = 0, face_points = 0, cell_faces = 0;  // Of the parts before.
+  for (std::uint64_t i = 0; i < part.index; ++i) {
+    faces += file.number("NumberOfFaces", i, 0);
+    face_points += file.number("NumberOfFaceConnectivityIds", i, 0);
+    cell_faces += file.number("NumberOfPolyhedronToFaceIds", i, 0);
+  }
+  const auto count = [&](const char* name) { return file.number(name, part.index, 0); };
+  FaceTables tables;
+  tables.points = integers(file, "FaceConnectivity", face_points, count("NumberOfFaceConnectivityIds"));
+  tables.point_ends = integers(file, "FaceOffsets", faces + part.index + 1, count("NumberOfFaces"));
+  tables.faces = integers(file, "PolyhedronToFaces", cell_faces, count("NumberOfPolyhedronToFaceIds"));
+  tables.face_ends = integers(file, "PolyhedronOffsets", part.first_offset + 1, part.cells);
+  vtkNew<vtkIdTypeArray> locations, streams;
+  if (!append_faces(tables, 0, *locations, *streams))
+    fail(file.path, "is damaged: its polyhedra name faces that are not there; copy or write it again");
+  grid.SetCells(&types, &cells, locations, streams);
 }
 
 vtkSmartPointer<vtkUnstructuredGrid> grid_of(const File& file, const Part& part) {
@@ -142,7 +176,6 @@ vtkSmartPointer<vtkUnstructuredGrid> grid_of(const File& file, const Part& part)
   cell_types->SetNumberOfValues(types->GetNumberOfTuples());
   for (vtkIdType i = 0; i < types->GetNumberOfTuples(); ++i) {
     const double type = types->GetComponent(i, 0);
-    if (type == VTK_POLYHEDRON) fail(file.path, "has polyhedra, which are not read from VTKHDF; save it as .vtu");
     cell_types->SetValue(i, static_cast<unsigned char>(std::clamp(type, 0.0, 255.0)));
   }
   const Array offsets = file.rows("Offsets", part.first_offset, part.cells + 1),
@@ -150,7 +183,7 @@ vtkSmartPointer<vtkUnstructuredGrid> grid_of(const File& file, const Part& part)
   vtkNew<vtkCellArray> cells;
   if (!vtkIdTypeArray::SafeDownCast(offsets) || !vtkIdTypeArray::SafeDownCast(ids) || !cells->SetData(offsets, ids))
     fail(file.path, "is damaged: its cells' points are no integers");
-  grid->SetCells(cell_types, cells);
+  set_cells(file, part, *cell_types, *cells, *grid);
   return grid;
 }
 

@@ -12,10 +12,12 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nifti2_io.h>
@@ -85,9 +87,16 @@ Image read_header(const std::filesystem::path& path) {
   return image;
 }
 
+/// Whether the fourth and the fifth axis are the columns and rows of matrices, as dipy writes arrays (X, Y, Z, 3, 3).
+bool has_matrices(const nifti_image& image) {
+  return image.dim[0] >= 5 && image.dim[4] == 3 && image.dim[5] == 3 &&
+         (image.dim[0] < 6 || image.nu * image.nv * image.nw == image.nu);
+}
+
 /// Counts the components along the fourth axis, or along the fifth, which the format prescribes for vectors and
-/// matrices.
+/// matrices, or along both.
 int component_count(const nifti_image& image, const std::filesystem::path& path) {
+  if (has_matrices(image)) return 9;
   const auto extent = [&](int axis) { return axis <= image.dim[0] ? image.dim[axis] : 1; };
   const std::int64_t four = extent(4), five = extent(5);
   const std::int64_t count = four > 1 ? four : five;
@@ -114,6 +123,18 @@ RawVoxels voxels_of(const nifti_image& image, const std::filesystem::path& path,
   (place.is_compressed ? place.skipped : place.offset) = static_cast<std::uint64_t>(image.iname_offset);
   voxels.bytes = read_numbers(path, place, voxels.type, lattice.size, lattice.components);
   return voxels;
+}
+
+/// Slices of matrices that are stored column by column, row by row.
+std::function<void(int, double*)> by_rows(const std::function<void(int, double*)>& read, std::int64_t pixels) {
+  return [read, pixels](int z, double* values) {
+    read(z, values);
+    for (double* matrix = values; matrix != values + 9 * pixels; matrix += 9) {
+      std::swap(matrix[1], matrix[3]);
+      std::swap(matrix[2], matrix[6]);
+      std::swap(matrix[5], matrix[7]);
+    }
+  };
 }
 
 bool has_orientation(const nifti_image& image) { return image.sform_code > 0 || image.qform_code > 0; }
@@ -160,13 +181,24 @@ Lattice open_nifti(const std::filesystem::path& given) {
     lattice.notes.push_back(
         "states no orientation (the codes of sform and qform are 0): its first axis is taken to run from right to "
         "left, as FSL does; set the sform if it does not");
+  if (lattice.components != 6)  // Of six, --order tells the axes.
+    lattice.frame_note =
+        "does not say the axes of its components: taken as those of the scanner (RAS); --frame says otherwise";
   if (image->intent_code == NIFTI_INTENT_SYMMATRIX && lattice.components == 6)
     lattice.order = TensorOrder::lower_triangle;
   if (lattice.order)
     lattice.frame_note =
         "does not say the axes of its symmetric matrices: taken as those of the voxels, as ANTs and dipy write them; "
         "--frame says otherwise";
-  lattice.read_slice = slices_of(voxels_of(*image, path, lattice), lattice.size, lattice.components);
+  RawVoxels voxels = voxels_of(*image, path, lattice);
+  if (has_matrices(*image)) {
+    lattice.frame = axes_of(ComponentFrame::voxels, lattice.to_world.linear());
+    lattice.frame_note =
+        "does not say the axes of its 3 x 3 matrices: taken as those of the voxels, as dipy writes them; --frame says "
+        "otherwise";
+  }
+  lattice.read_slice = slices_of(std::move(voxels), lattice.size, lattice.components);
+  if (has_matrices(*image)) lattice.read_slice = by_rows(lattice.read_slice, image->nx * image->ny);
   return lattice;
 }
 

@@ -210,6 +210,9 @@ Lattice open_nrrd(const std::filesystem::path& path) {
   lattice.to_world = to_world(*nrrd, axes, path);
   lattice.frame = frame_of(*nrrd, path);
   lattice.takes_frame = is_anatomical(*nrrd) && !has_frame(*nrrd);
+  if (lattice.takes_frame)
+    lattice.frame_note =
+        "has no measurement frame: the axes of its components are taken as those of its space; --frame says otherwise";
   lattice.zero_is_background = true;
   lattice.read_slice = slices_of(voxels_of(std::move(nrrd), axes), lattice.size, lattice.components);
   return lattice;

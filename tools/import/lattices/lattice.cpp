@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <stdexcept>
 #include <tuple>
@@ -31,7 +32,10 @@ template <class Block>
 struct Place {
   std::unique_ptr<Block> block;
   std::size_t background = 0, non_finite = 0;
+  FillValues fills;
 };
+
+int unmasked(const Lattice& lattice) { return lattice.components - (lattice.masked ? 1 : 0); }
 
 bool is_background(const Lattice& lattice, const double* components) {
   if (lattice.masked && !(components[0] >= 0.5)) return true;  // A NaN in the mask counts as masked.
@@ -51,11 +55,13 @@ void put(const Lattice& lattice, const ValueOf& value_of, const double* slice, c
         ++place.background;
         continue;
       }
-      const auto value = value_of(components + (lattice.masked ? 1 : 0));
+      components += lattice.masked ? 1 : 0;
+      const auto value = value_of(components);
       if (!value.allFinite()) {
         ++place.non_finite;
         continue;
       }
+      place.fills.add(components, unmasked(lattice));
       if (!place.block) {
         place.block = std::make_unique<Block>();
         place.block->origin = first;
@@ -82,6 +88,8 @@ void add_slab(const Lattice& lattice, const ValueOf& value_of, int first_z, std:
   for (auto& place : places) {
     report.background += place.background;
     report.non_finite += place.non_finite;
+    report.fills.count += place.fills.count;
+    if (place.fills.count > 0) report.fills.example = place.fills.example;
     if (!place.block) continue;
     report.active += place.block->active.count();
     blocks.push_back(std::move(*place.block));
@@ -131,13 +139,32 @@ std::string called(const Lattice& lattice) {
   return lattice.array.empty() ? "the file" : fmt::format("array \"{}\"", lattice.array);
 }
 
-int unmasked(const Lattice& lattice) { return lattice.components - (lattice.masked ? 1 : 0); }
+/// Whether vectors are directions: those that are not zero have the length 1.
+bool has_directions(const Lattice& lattice) {
+  const auto voxels = static_cast<std::size_t>(lattice.size.x()) * static_cast<std::size_t>(lattice.size.y());
+  std::vector<double> slice(voxels * static_cast<std::size_t>(lattice.components));
+  bool has_some = false;
+  for (int z = lattice.size.z() - 1; z >= 0; --z) {
+    lattice.read_slice(z, slice.data());
+    for (std::size_t i = 0; i < voxels; ++i) {
+      const double* const vector = &slice[(i + 1) * static_cast<std::size_t>(lattice.components) - 3];
+      const double length = Eigen::Map<const Vector3d>(vector).norm();
+      if (length > 0 && !(std::abs(length - 1) < 0.01)) return false;
+      has_some = has_some || length > 0;
+    }
+  }
+  return has_some;
+}
 
 TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& order) {
   const int count = unmasked(lattice);
   if (count == 3)
     throw std::invalid_argument(
-        called(lattice) + " has three components, a vector: derive a tensor (--gradient-of), or choose another array");
+        called(lattice) +
+        (has_directions(lattice)
+             ? " has vectors of length 1, as eigenvectors (dti_V1) are, of which no tensor can be made: import the "
+               "tensor itself (FSL: dtifit --save_tensor writes dti_tensor)"
+             : " has three components, a vector: derive a tensor (--gradient-of), or choose another array"));
   if (count != 4 && count != 6 && count < 9)
     throw std::invalid_argument(fmt::format("{} has {} component{} and a tensor six or nine: choose another array",
                                             called(lattice), count, count == 1 ? "" : "s"));
@@ -198,6 +225,7 @@ void take_frame(Lattice& lattice, ComponentFrame frame) {
 
 TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& order, LatticeReport& report) {
   const TensorOrder chosen = order_of(lattice, order);
+  const bool is_usual = lattice.usual_order && !lattice.order && !order;
   const Matrix3d frame = frame_of(lattice, chosen);
   TensorGrid grid = empty_grid(lattice);
   // Anatomical files hold diffusion tensors, whose eigenvalues are positive unless the user's order is wrong.
@@ -212,6 +240,7 @@ TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& 
     return symmetric;
   };
   read_blocks(lattice, tensor, grid.blocks, report);
+  if (is_usual) report.notes.push_back("its six components are taken in the usual order; --order says otherwise");
   report.negative = static_cast<double>(negative) / static_cast<double>(std::max<std::size_t>(1, report.active));
   return grid;
 }

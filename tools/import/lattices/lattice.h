@@ -11,6 +11,7 @@
 
 #include <Eigen/Geometry>
 
+#include "tools/import/lattices/fill_values.h"
 #include "tools/import/lattices/tensor_order.h"
 #include "volumes/grids/tensor_grid.h"
 
@@ -65,6 +66,7 @@ struct LatticeReport {
   std::size_t voxels = 0, active = 0;
   std::size_t non_finite = 0;      ///< Made inactive, because a component was NaN or infinite.
   std::size_t background = 0;      ///< Inactive because of the mask, or because they are exactly zero.
+  FillValues fills;                ///< Of the active voxels.
   double negative = 0;             ///< Of an anatomical file whose order the user gave: the part of the active voxels
                                    ///< that have a negative eigenvalue.
   std::vector<std::string> notes;  ///< Those of the lattice.

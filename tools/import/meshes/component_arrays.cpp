@@ -22,13 +22,6 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-Names names_in(const std::string& list) {
-  Names names;
-  std::istringstream stream(list + ",");  // getline drops an empty name at the end
-  for (std::string name; std::getline(stream, name, ',');) names.push_back(trimmed(name));
-  return names;
-}
-
 /// A component of an array; `component` is -1 for a vector as a whole.
 struct Part {
   vtkDataArray* array = nullptr;
@@ -57,6 +50,24 @@ std::optional<Part> part_called(vtkDataSetAttributes& data, const std::string& n
       for (int k = 0; k < array->GetNumberOfComponents(); ++k)
         if (array->GetNumberOfComponents() > 1 && component_name(*array, k) == name) return Part{array, k};
   return {};
+}
+
+/// The names in a list. What lies between several commas is one name where the mesh has it.
+Names names_in(vtkDataSet& mesh, const std::string& list) {
+  Names parts, names;
+  std::istringstream stream(list + ",");  // getline drops an empty name at the end
+  for (std::string name; std::getline(stream, name, ',');) parts.push_back(name);
+  const auto is_known = [&](const std::string& name) {
+    return part_called(*mesh.GetPointData(), name) || part_called(*mesh.GetCellData(), name);
+  };
+  for (std::size_t i = 0, next = 0; i < parts.size(); i = next) {
+    std::string name = trimmed(parts[i]), longer = parts[i];
+    next = i + 1;
+    for (std::size_t k = i + 1; k < parts.size(); ++k)
+      if (longer += "," + parts[k]; is_known(trimmed(longer))) name = trimmed(longer), next = k + 1;
+    names.push_back(name);
+  }
+  return names;
 }
 
 /// The attributes, of points or else of cells, that have all that is listed.
@@ -163,7 +174,7 @@ bool is_array_list(vtkDataSet& mesh, const std::string& names) {
 }
 
 ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& list, Take take, bool is_flat) {
-  const Names names = names_in(list);
+  const Names names = names_in(mesh, list);
   vtkDataSetAttributes& data = attributes_with(mesh, names);
   const std::vector<Part> parts = parts_of(mesh, data, names, take, is_flat);
   const vtkSmartPointer<vtkDataArray> joined = is_plane(parts, take)  ? joined_of_plane(mesh, parts)

@@ -168,6 +168,8 @@ double MeshCell::volume() const {
   return volume;
 }
 
+double MeshCell::edge() const { return std::cbrt(has_frame_ ? 1 / std::abs(to_frame_.determinant()) : volume()); }
+
 double MeshCell::thickness(const Eigen::Vector3d& scale) const {
   if (!has_frame_) {
     const Eigen::Matrix3Xd points = scale.asDiagonal() * (positions_.colwise() - positions_.rowwise().mean());

@@ -37,10 +37,13 @@ class MeshCell {
   vtkGenericCell& vtk() const { return *cell_; }
   Shape shape() const { return shape_; }
   bool is_linear() const { return linear_; }
+  /// Of a cell of `tetrahedra`: the points of each face, around it, as numbers of the cell's points.
+  const std::vector<std::vector<std::size_t>>& faces() const { return faces_; }
 
   /// Contains the cell. For a curved cell it is larger than the box of its points.
   Eigen::AlignedBox3d box() const;
   double volume() const;
+  double edge() const;  ///< Of a cube that is as large, or that is divided into such simplices or prisms.
 
   /// The least distance between opposite faces, after a stretch by `scale` along each axis: as if the cell were what it
   /// is at its centre. Of simplices and prisms it is √2 times that, so that a cube's tetrahedra are as thick as the

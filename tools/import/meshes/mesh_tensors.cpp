@@ -20,6 +20,7 @@
 #include <vtkUnsignedCharArray.h>
 
 #include "tools/import/lattices/tensor_order.h"
+#include "tools/import/meshes/cell_gradients.h"
 #include "tools/import/meshes/mesh_cell.h"
 
 namespace tensorray {
@@ -43,7 +44,8 @@ void for_each_array(vtkDataSet& mesh, const Visit& visit) {
     for (int i = 0; i < data.GetNumberOfArrays(); ++i) {
       vtkDataArray* array = data.GetArray(i);
       if (!array || !array->GetName()) continue;
-      if (std::string(array->GetName()) != vtkDataSetAttributes::GhostArrayName()) visit(*array, of_cells);
+      const std::string name = array->GetName();
+      if (name != vtkDataSetAttributes::GhostArrayName() && name != layer_array) visit(*array, of_cells);
     }
   }
 }
@@ -182,13 +184,16 @@ vtkSmartPointer<vtkDataSet> with_arrays(vtkDataSet& mesh, const Array& of_points
   auto result = vtkSmartPointer<vtkDataSet>::Take(mesh.NewInstance());
   result->CopyStructure(&mesh);
   for (const bool cells : {false, true}) {
-    if (vtkDataArray* ghosts = attributes_of(mesh, cells).GetArray(vtkDataSetAttributes::GhostArrayName()))
-      attributes_of(*result, cells).AddArray(ghosts);
+    for (const char* const kept : {vtkDataSetAttributes::GhostArrayName(), layer_array})
+      if (vtkDataArray* array = attributes_of(mesh, cells).GetArray(kept))
+        attributes_of(*result, cells).AddArray(array);
     if (const Array& tensors = cells ? of_cells : of_points) {
       tensors->SetName(tensor_array);
       attributes_of(*result, cells).AddArray(tensors);
     }
   }
+  result->GetCellData()->SetHigherOrderDegrees(mesh.GetCellData()->GetHigherOrderDegrees());
+  result->GetPointData()->SetRationalWeights(mesh.GetPointData()->GetRationalWeights());
   // VTK 9.1 keeps that a structured grid has no ghosts from when its structure was copied.
   result->UpdatePointGhostArrayCache();
   result->UpdateCellGhostArrayCache();
@@ -236,6 +241,7 @@ ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take, C
     for (ArrayChoice& choice : choices) {
       if (choice.name != array.GetName()) continue;
       choice.of_cells = cell_values == CellValues::constant;
+      choice.is_at_both = true;
       return;
     }
     choices.push_back({array.GetName(), of_cells});
@@ -269,11 +275,23 @@ vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& ar
   const TensorOrder known_order = take == Take::tensor ? order_in(*given, order) : TensorOrder::full;
   const Array of_cells = tensors_of_cells ? tensors_in(point_values(*given), known_order) : nullptr;
   if (cell_values == CellValues::constant) return with_arrays(mesh, nullptr, of_cells);
+  if (array.of_cells && take != Take::tensor) {
+    const CellGradients gradients = cell_gradients(mesh, *given);
+    for (const Array& tensors : {gradients.of_points, gradients.of_cells})
+      if (take == Take::strain) make_symmetric(*tensors);
+    mark_unusable_points(mesh, *gradients.of_points);
+    return with_arrays(mesh, gradients.of_points, gradients.of_cells);
+  }
   const Array values = array.of_cells ? averaged_to_points(mesh, *given) : point_values(*given);
   const Array tensors = take == Take::tensor ? tensors_in(values, known_order) : gradient_of(mesh, values);
   if (take == Take::strain) make_symmetric(*tensors);
   mark_unusable_points(mesh, *tensors);
   return with_arrays(mesh, tensors, of_cells);
+}
+
+const double* made_tensors(vtkDataSetAttributes& attributes) {
+  auto* const array = vtkDoubleArray::SafeDownCast(attributes.GetArray(tensor_array));
+  return array && array->GetNumberOfComponents() == 9 ? array->GetPointer(0) : nullptr;
 }
 
 }  // namespace tensorray

@@ -33,6 +33,7 @@ enum class CellValues { linear, constant };
 struct ArrayChoice {
   std::string name;
   bool of_cells = false;
+  bool is_at_both = false;  ///< There is one at points and one at cells.
 };
 
 /// The arrays at the cells or points of a mesh.
@@ -40,6 +41,9 @@ vtkDataSetAttributes& attributes_of(vtkDataSet& mesh, bool of_cells);
 
 /// The name of the array that with_tensors makes.
 constexpr const char* tensor_array = "tensor";
+
+/// Cells may have a vtkIntArray of this name: which of several layers, of which each overlaps others, they are in.
+constexpr const char* layer_array = "tensorray:layer";
 
 /// The arrays of a mesh in words, for messages: "there are: velocity (3 components, points), ...".
 std::string list_of_arrays(vtkDataSet& mesh);
@@ -64,9 +68,9 @@ bool is_array_list(vtkDataSet& mesh, const std::string& names);
 /// plane of x and y has three or four (xx, yy, xy, and perhaps zz, as the last two letters of their names tell). A
 /// vector has three components; in a flat mesh across z also two. Each is a scalar array, NAME:COMPONENT of another
 /// array (by the component's name, or its number from 0 on), or a component with that name, as VTK joins scalars of
-/// ExodusII. Spaces around a name do not count. A name may occur twice. All are at points, or else all are at cells.
-/// The components of the new array have the names of the old ones, of which with_tensors finds their
-/// order; they are sorted if that order has no name (tensor_order.h).
+/// ExodusII. Names may have commas. Spaces around a name do not count. A name may occur twice. All are at points, or
+/// else all are at cells. The components of the new array have the names of the old ones, of which with_tensors finds
+/// their order; they are sorted if that order has no name (tensor_order.h).
 /// @param is_flat  The mesh is flat across z, or was before it became a slab.
 /// @throw std::invalid_argument that names the array and lists those that there are.
 ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& names, Take take = Take::tensor, bool is_flat = false);
@@ -74,10 +78,10 @@ ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& names, Take take = 
 /// The points and cells of a mesh with one point array `tensor_array`: a vtkDoubleArray of nine components, row by
 /// row. The tensors are the array's components (six, nine or more; of more than nine the first six are the tensor,
 /// and the others are derived from it), or derivatives that are computed on the mesh itself, before any resampling.
-/// Cell arrays are first averaged to points, over the cells that MeshCell uses and whose values are finite. The result
-/// is NaN at points whose tensor is not finite, and at hidden points. Derivatives do not use cells with points that are
-/// hidden or not finite. Where the tensors themselves are an array of cells, the mesh also has it as a cell array
-/// `tensor_array`, and no point array if `cell_values` is constant.
+/// Tensors of cells are averaged to points, over the cells that MeshCell uses and whose values are finite. Derivatives
+/// of vectors of cells are those of cell_gradients.h. The result is NaN at points whose tensor is not finite, and at
+/// hidden points. Derivatives do not use cells with points that are hidden or not finite. Where the array is one of
+/// cells, the mesh also has a cell array `tensor_array`, and no point array if `cell_values` is constant.
 /// @param order  Order of six components, and of more than nine. Not needed if the components' names tell it (XX, YY,
 /// ...); then it must not contradict them.
 /// @return a mesh that shares the geometry of the given one, and keeps its vtkGhostType.
@@ -86,5 +90,8 @@ ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& names, Take take = 
 vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& array, Take take,
                                          const std::optional<TensorOrder>& order,
                                          CellValues cell_values = CellValues::linear);
+
+/// The tensors that with_tensors makes, nine numbers each; null if there are none.
+const double* made_tensors(vtkDataSetAttributes& attributes);
 
 }  // namespace tensorray

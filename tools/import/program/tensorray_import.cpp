@@ -55,7 +55,7 @@ struct ImportOptions {
   std::filesystem::path output, boundary;
   std::string name, units, steps = "last";
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
-  bool half = false, quiet = false, tells_progress = false;
+  bool no_surface = false, half = false, quiet = false, tells_progress = false;
 };
 
 /// What a name stands for; CLI11 has checked that there is such a name.
@@ -73,6 +73,7 @@ ImportSettings settings_of(const ImportOptions& options) {
   if (!options.strain_of.empty()) settings.take = Take::strain;
   settings.order = named(options.order, tensor_orders());
   settings.frame = named(options.frame, component_frames());
+  settings.surface = !options.no_surface;
   if (options.cells == "constant") settings.cell_values = CellValues::constant;
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
@@ -113,6 +114,8 @@ void print_sampling(const ImportReport& report) {
                         mesh.voxel.z(), mesh.active));
   tell_made(fmt::format("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}",
                         mesh.native_peak, mesh.sampled_peak, mesh.native_median, mesh.sampled_median));
+  if (mesh.overlaid > 0)
+    tell_made(fmt::format("  {} voxels lie in several blocks, which overlap: the smallest cell counts", mesh.overlaid));
   if (mesh.non_finite > 0)
     tell_made(fmt::format("  {} {} of the mesh are not finite", mesh.non_finite, mesh.of_cells ? "cells" : "points"));
   if (mesh.sampled_peak < kept_peak * mesh.native_peak)
@@ -121,6 +124,16 @@ void print_sampling(const ImportReport& report) {
              "around what matters, holds more",
              100 * mesh.sampled_peak / mesh.native_peak)},
          false);
+}
+
+void print_surface(const BodySurface& surface, const TriangleMesh& triangles) {
+  const std::string inner =
+      surface.inner_faces > 0 ? fmt::format("; {} inner faces left out", surface.inner_faces) : "";
+  if (surface.open_edges > 0)
+    tell_made(fmt::format("  surface: none, as the cells' faces leave {} edges open{}", surface.open_edges, inner));
+  else
+    tell_made(fmt::format("  surface: {} triangles, volume {:.6g}{}{}", triangles.triangles.size(), triangles.volume(),
+                          surface.area > 0 ? fmt::format(", area {:.6g}", surface.area) : "", inner));
 }
 
 /// Progress as a line of phase, done and total, for a program that has started this one.
@@ -152,6 +165,9 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
     tell_made(fmt::format("  a flat mesh: a slab of one voxel, {:.4g} thick{}", report.thickness,
                           settings.thickness ? "" : " (--thickness)"));
   if (report.mesh) print_sampling(report);
+  if (report.surface) print_surface(*report.surface, grid.surface);
+  for (const std::string& note : report.notes) tell_made(fmt::format("  {}", escaped(note)));
+  for (const std::string& warning : report.warnings) tell({"tensorray: warning: " + warning}, false);
   if (report.boundary_triangles > 0)
     tell_made(
         fmt::format("{}: the body's surface, {} triangles", options.boundary.string(), report.boundary_triangles));
@@ -323,9 +339,9 @@ void add_import_options(CLI::App& program, Progress& progress) {
                   "(.cgns), an OpenFOAM "
                   "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), MetaImage (.mha "
                   ".mhd), MRtrix (.mif .mif.gz .mih), NumPy (.npy); "
-                  "of PLOT3D two, the grid and its q")
+                  "of PLOT3D two, the grid and its q; of Nemesis (NAME.N.0 ...) any of the pieces")
       ->required()
-      ->expected(1, 2)
+      ->expected(1, CLI::detail::expected_max_vector_size)
       ->option_text("FILE...");
   program.add_option("-o,--output", options->output, "The field to write, FILE.vdb")
       ->required()
@@ -336,6 +352,8 @@ void add_import_options(CLI::App& program, Progress& progress) {
                   "Write the surface of the body that the mesh lies around, for `obstacles`: FILE.ply")
       ->check(check_ply_output)
       ->option_text("FILE");
+  program.add_flag("--no-surface", options->no_surface,
+                   "Leave out the surface of the body that a mesh is, within which light bends");
   program
       .add_option(
           "--steps", options->steps,

@@ -110,10 +110,33 @@ struct Workspace {
   MeshCell cell;
   std::vector<VoxelAverage> averages = std::vector<VoxelAverage>(TensorBlock::voxels);
   std::array<double, TensorBlock::voxels> fineness{};  ///< Of the finest cell in each voxel.
+  std::array<int, TensorBlock::voxels> layer{};        ///< From which each voxel has its value.
 };
 
+/// The voxels of a block whose centres are in a cell, and those that are in cells of several layers.
+struct Filled {
+  Voxels taken, overlaid;
+};
+
+/// Sets the tensor of a voxel whose centre is in the loaded cell. Where layers overlap, cells without data do not
+/// count.
+void fill_voxel(const MeshSource& source, Workspace& work, vtkIdType id, std::size_t offset, TensorBlock& block,
+                Filled& filled) {
+  const int layer = source.layers ? source.layers[id] : 0;
+  const bool is_other = filled.taken[offset] && layer != work.layer[offset];
+  const Eigen::Matrix3f tensor = matrix_of(tensor_in(source, work.cell, id, work.cell.weights()));
+  if (source.layers && !tensor.allFinite()) return;
+  if (is_other) filled.overlaid.set(offset);
+  if (filled.taken[offset]) return;
+  filled.taken.set(offset);
+  work.layer[offset] = layer;
+  if (!tensor.allFinite()) return;
+  block.values[offset] = tensor;
+  block.active.set(offset);
+}
+
 /// Sets the tensors of the block's voxels whose centres are in the cell and were in no earlier cell.
-void fill_from_cell(const MeshSource& source, MeshCell& cell, vtkIdType id, TensorBlock& block, Voxels& taken) {
+void fill_from_cell(const MeshSource& source, Workspace& work, vtkIdType id, TensorBlock& block, Filled& filled) {
   const AlignedBox3i voxels =
       voxels_in(source.solid.boxes[static_cast<std::size_t>(id)], source.lattice, Vector3d::Constant(source.tolerance));
   if (voxels.isEmpty()) return;
@@ -123,21 +146,20 @@ void fill_from_cell(const MeshSource& source, MeshCell& cell, vtkIdType id, Tens
     for (int y = from.y(); y <= to.y(); ++y)
       for (int z = from.z(); z <= to.z(); ++z) {
         const auto offset = static_cast<std::size_t>(TensorBlock::offset(x, y, z));
-        if (taken[offset]) continue;
-        if (!cell.find(source.lattice.position(block.origin + Vector3i(x, y, z)), source.tolerance)) continue;
-        taken.set(offset);
-        const Eigen::Matrix3f tensor = matrix_of(tensor_in(source, cell, id, cell.weights()));
-        if (!tensor.allFinite()) continue;
-        block.values[offset] = tensor;
-        block.active.set(offset);
+        const bool is_done = !source.layers || filled.overlaid[offset] || work.layer[offset] == source.layers[id];
+        if (filled.taken[offset] && is_done) continue;
+        if (work.cell.find(source.lattice.position(block.origin + Vector3i(x, y, z)), source.tolerance))
+          fill_voxel(source, work, id, offset, block, filled);
       }
 }
 
-void fill_centres(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, MeshCell& cell,
-                  TensorBlock& block) {
-  Voxels taken;
-  for (const vtkIdType* id = begin; id != end && !taken.all(); ++id)
-    if (load(source, cell, *id)) fill_from_cell(source, cell, *id, block, taken);
+/// @return the number of voxels in several layers.
+std::size_t fill_centres(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
+                         TensorBlock& block) {
+  Filled filled;
+  for (const vtkIdType* id = begin; id != end && (source.layers || !filled.taken.all()); ++id)
+    if (load(source, work.cell, *id)) fill_from_cell(source, work, *id, block, filled);
+  return filled.overlaid.count();
 }
 
 struct AveragedCell {
@@ -208,7 +230,7 @@ void add_samples(const MeshSource& source, Workspace& work, const AveragedCell& 
         if (!(index >= 0).all() || !(index < TensorBlock::size).all()) continue;
         const auto offset = static_cast<std::size_t>(
             TensorBlock::offset(static_cast<int>(index.x()), static_cast<int>(index.y()), static_cast<int>(index.z())));
-        if (!voxels[offset]) continue;
+        if (!voxels[offset] || (source.layers && source.layers[cell.id] != work.layer[offset])) continue;
         work.averages[offset].add((position - index).matrix(), weight, tensor + changes * along);
         work.fineness[offset] = std::max(work.fineness[offset], cell.fineness);
       }
@@ -276,28 +298,36 @@ Vector3d margin_of(const MeshSource& source) {
 
 }  // namespace
 
-TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress) {
-  const Bins bins = bins_of(source.solid, source.lattice, margin_of(source));
+TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress, std::size_t& overlaid) {
+  Bins bins = bins_of(source.solid, source.lattice, margin_of(source));
   std::vector<std::size_t> used;
   for (std::size_t block = 0; block + 1 < bins.first.size(); ++block)
     if (bins.first[block] < bins.first[block + 1]) used.push_back(block);
   TensorBlocks blocks = make_blocks(used.size());
   const std::thread::id caller = std::this_thread::get_id();
   std::atomic<std::uint64_t> done{0};
+  std::atomic<std::size_t> in_layers{0};
+  const auto is_finer = [&](vtkIdType a, vtkIdType b) {
+    const int of_a = source.solid.coarseness[static_cast<std::size_t>(a)];
+    const int of_b = source.solid.coarseness[static_cast<std::size_t>(b)];
+    return of_a != of_b ? of_a < of_b : a < b;
+  };
   using Range = tbb::blocked_range<std::size_t>;
   tbb::parallel_for(Range(0, used.size(), 4), [&](const Range& range) {
     Workspace work;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const vtkIdType* const begin = bins.cells.data() + bins.first[used[i]];
-      const vtkIdType* const end = bins.cells.data() + bins.first[used[i] + 1];
+      vtkIdType* const begin = bins.cells.data() + bins.first[used[i]];
+      vtkIdType* const end = bins.cells.data() + bins.first[used[i] + 1];
+      if (source.layers) std::sort(begin, end, is_finer);
       blocks[i].origin = TensorBlock::size * bins.block(used[i]);
-      fill_centres(source, begin, end, work.cell, blocks[i]);
+      in_layers += fill_centres(source, begin, end, work, blocks[i]);
       if (blocks[i].active.any()) average_voxels(source, begin, end, work, blocks[i]);
     }
     done += range.size();
     if (std::this_thread::get_id() == caller) progress.update("sampling", done, used.size());
   });
   progress.update("sampling", used.size(), used.size());
+  overlaid = in_layers;
   return blocks;
 }
 

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <vtkCellData.h>
 #include <vtkDataSet.h>
-#include <vtkDoubleArray.h>
+#include <vtkIntArray.h>
 #include <vtkPointData.h>
 
 #include "tools/import/meshes/mesh_tensors.h"
@@ -59,6 +59,7 @@ Norms norms_of_cells(const double* tensors, const Solid& solid, const AlignedBox
   return norms;
 }
 
+/// @throw std::invalid_argument if no tensor is finite.
 void report_native(const MeshSource& source, const AlignedBox3d& bounds, SamplingReport& report) {
   Norms norms = source.cell_tensors ? norms_of_cells(source.cell_tensors, source.solid, bounds, source.tolerance)
                                     : norms_of_points(source.mesh, source.point_tensors, source.solid, bounds);
@@ -67,6 +68,10 @@ void report_native(const MeshSource& source, const AlignedBox3d& bounds, Samplin
   report.of_cells = source.cell_tensors != nullptr;
   report.non_finite = static_cast<std::size_t>(norms.end() - finite_end);
   norms.erase(finite_end, norms.end());
+  if (norms.empty() && report.non_finite > 0)
+    throw std::invalid_argument(
+        fmt::format("all {} {} have NaN or infinite tensors: choose another array or step of time, or other --bounds",
+                    report.non_finite, report.of_cells ? "cells" : "points"));
   std::tie(report.native_peak, report.native_median) = peak_and_median(norms);
 }
 
@@ -80,26 +85,22 @@ void report_sampled(const TensorGrid& grid, SamplingReport& report) {
   std::tie(report.sampled_peak, report.sampled_median) = peak_and_median(norms);
 }
 
-/// The tensors of with_tensors at points or cells; null if there are none.
-const double* tensors_in(vtkDataSetAttributes& attributes) {
-  auto* const array = vtkDoubleArray::SafeDownCast(attributes.GetArray(tensor_array));
-  return array && array->GetNumberOfComponents() == 9 ? array->GetPointer(0) : nullptr;
-}
-
 }  // namespace
 
 TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const Progress& progress,
                        SamplingReport& report) {
-  const double* const of_points = tensors_in(*mesh.GetPointData());
-  const double* const of_cells = tensors_in(*mesh.GetCellData());
+  const double* const of_points = made_tensors(*mesh.GetPointData());
+  const double* const of_cells = made_tensors(*mesh.GetCellData());
   if (!of_points && !of_cells) throw std::invalid_argument("the mesh has no tensors: it must come from with_tensors");
   const Solid solid = solid_part(mesh);
   const SamplingLattice lattice = sampling_lattice(mesh, solid, settings);
   const double tolerance = face_tolerance * solid.bounds.diagonal().norm();
-  const MeshSource source{mesh, of_points, of_cells, solid, lattice, tolerance};
+  auto* const layers = vtkIntArray::SafeDownCast(mesh.GetCellData()->GetArray(layer_array));
+  const MeshSource source{mesh,     of_points, of_cells, solid, lattice, layers ? layers->GetPointer(0) : nullptr,
+                          tolerance};
   TensorGrid grid;
   grid.to_world = Eigen::Translation3d(lattice.origin) * Eigen::Scaling(lattice.voxel);
-  grid.blocks = mesh_blocks(source, progress);
+  grid.blocks = mesh_blocks(source, progress, report.overlaid);
   remove_empty_blocks(grid);
   report.size = lattice.size;
   report.voxel = lattice.voxel;

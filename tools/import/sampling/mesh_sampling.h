@@ -17,7 +17,8 @@ namespace tensorray {
 
 struct SamplingSettings {
   /// The number of voxels along the longest edge (int), the numbers along x, y, z (>= 2 each), or the edge of a voxel
-  /// (double). If none is given, a voxel is about as large as the median cell, with at most 2^21 voxels.
+  /// (double). If none is given, a voxel is about as large as the median cell, and fits between the two sides of a thin
+  /// mesh, with at most 2^21 voxels.
   std::variant<std::monostate, int, Eigen::Vector3i, double> resolution;
   std::optional<Eigen::AlignedBox3d> bounds;  ///< World; default: bounds of the three-dimensional cells.
   int flat_axis = -1;  ///< The axis across a slab (flat_mesh.h), along which there is one voxel; -1: none.
@@ -30,12 +31,14 @@ struct SamplingReport {
   bool of_cells = false;                      ///< Whether the mesh has its tensors at cells, else at points.
   double native_peak = 0, native_median = 0;  ///< ‖T‖ (Frobenius) of the used cells, or their points, in `bounds`.
   double sampled_peak = 0, sampled_median = 0;  ///< ‖T‖ at the active voxels.
+  std::size_t overlaid = 0;                     ///< Voxels that lie in several blocks, which overlap.
   std::size_t non_finite = 0;                   ///< Of those cells or points: whose tensor is not finite.
 };
 
 /// Samples the tensors of with_tensors at the voxels of a lattice. A voxel is active if its centre is in a cell whose
-/// tensor is finite; where cells overlap, the cell with the lowest index counts. Voxels within 1e-6 of the mesh's
-/// diagonal of a face count as inside. The lattice is centred in the box as far as the box extends.
+/// tensor is finite; where cells overlap, the cell with the lowest index counts. Where layers overlap (layer_array),
+/// the smallest cell with a finite tensor counts, and a voxel takes its value from one layer. Voxels within 1e-6 of the
+/// mesh's diagonal of a face count as inside. The lattice is centred in the box as far as the box extends.
 ///
 /// A voxel takes the tensor at its centre, interpolated in the cell that contains it (it is NaN if a point with a
 /// weight has NaN), or the cell's own if the mesh has tensors at cells alone. Where cells are thinner than voxels, it

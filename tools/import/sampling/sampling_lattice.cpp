@@ -10,10 +10,12 @@
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <vtkCellData.h>
 #include <vtkDataSet.h>
 
 #include "base/overloaded.h"
 #include "tools/import/meshes/mesh_cell.h"
+#include "tools/import/meshes/mesh_tensors.h"
 
 namespace tensorray {
 namespace {
@@ -62,8 +64,20 @@ bool is_small(const Vector3d& voxels) {
 
 double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& box) {
   double voxel = std::min(typical_edge(mesh, solid, box), box.sizes().maxCoeff());
+  // Two across what is thin, if they are not too many.
+  if (const double thin = std::min(voxel, box.sizes().minCoeff()); is_small(voxels_along(box.sizes(), thin)))
+    voxel = thin;
   while (!is_small(voxels_along(box.sizes(), voxel))) voxel *= 1.01;
   return voxel;
+}
+
+/// Four steps for each halving of the edge. Cells of one size, which differ by rounding, become equal.
+std::vector<int> coarseness_of(const std::vector<float>& edges) {
+  const float largest = edges.empty() ? 1 : *std::max_element(edges.begin(), edges.end());
+  std::vector<int> coarseness;
+  for (const float edge : edges)
+    coarseness.push_back(edge > 0 ? static_cast<int>(std::lround(4 * std::log2(edge / largest))) : 0);
+  return coarseness;
 }
 
 void require_two(int count) {
@@ -78,6 +92,8 @@ Solid solid_part(vtkDataSet& mesh) {
   solid.boxes.resize(static_cast<std::size_t>(count));
   solid.thickness.resize(solid.boxes.size());
   std::vector<AlignedBox3d> hulls(solid.boxes.size());
+  const bool has_layers = mesh.GetCellData()->HasArray(layer_array) != 0;
+  std::vector<float> edges(has_layers ? solid.boxes.size() : 0);
   std::vector<std::atomic<bool>> used(static_cast<std::size_t>(mesh.GetNumberOfPoints()));
   MeshCell first;
   if (count > 0) first.load(mesh, 0);  // makes VTK's cached data on one thread
@@ -87,6 +103,8 @@ Solid solid_part(vtkDataSet& mesh) {
       if (!cell.load(mesh, id)) continue;
       solid.boxes[static_cast<std::size_t>(id)] = cell.box();
       solid.thickness[static_cast<std::size_t>(id)] = static_cast<float>(cell.thickness(Vector3d::Ones()));
+      if (const double edge = has_layers ? cell.edge() : NAN; std::isfinite(edge))
+        edges[static_cast<std::size_t>(id)] = static_cast<float>(edge);
       for (int i = 0; i < cell.points(); ++i) {
         hulls[static_cast<std::size_t>(id)].extend(cell.positions().col(i));
         used[static_cast<std::size_t>(cell.point(i))].store(true, std::memory_order_relaxed);
@@ -95,6 +113,7 @@ Solid solid_part(vtkDataSet& mesh) {
   });
   for (const AlignedBox3d& hull : hulls) solid.bounds.extend(hull);
   solid.points.assign(used.begin(), used.end());
+  solid.coarseness = coarseness_of(edges);
   if (solid.bounds.isEmpty())
     throw std::invalid_argument(
         "the mesh has no three-dimensional cells (it is flat, or points alone): a field needs tensors in a volume");

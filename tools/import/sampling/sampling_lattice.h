@@ -14,6 +14,7 @@ namespace tensorray {
 struct Solid {
   std::vector<Eigen::AlignedBox3d> boxes;  ///< Box of each cell of the mesh; empty for cells that are not used.
   std::vector<float> thickness;            ///< Of each used cell, world units: MeshCell::thickness.
+  std::vector<int> coarseness;             ///< Of cells in layers: 0 for the largest, −4 for half of its edge, ...
   Eigen::AlignedBox3d bounds;              ///< Bounds of the points of the used cells.
   std::vector<bool> points;                ///< For each point of the mesh: whether a used cell has it.
 };
@@ -45,10 +46,12 @@ struct MeshSource {
   const double* cell_tensors;   ///< Nine for each cell; may be null. Cells whose tensor is not finite are left out.
   const Solid& solid;
   const SamplingLattice& lattice;
-  double tolerance;  ///< Distance from a cell below which a voxel's centre is in it.
+  const int* layers;  ///< Of each cell (layer_array); null if no layers overlap.
+  double tolerance;   ///< Distance from a cell below which a voxel's centre is in it.
 };
 
 /// The blocks that may have active voxels, as sample_mesh (mesh_sampling.h) describes them, ordered by origin.
-TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress);
+/// @param overlaid  Becomes the number of voxels that are in several layers.
+TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress, std::size_t& overlaid);
 
 }  // namespace tensorray

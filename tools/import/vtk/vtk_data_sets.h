@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include <vtkSmartPointer.h>
@@ -18,6 +19,7 @@ struct MeshFile {
   int steps = 1;  ///< Of time; 0 or 1 if it has none.
   /// Reads the data set, or a tree of them, at a step from 0 on. @throw std::runtime_error naming the file and the fix.
   std::function<vtkSmartPointer<vtkDataObject>(int step)> read;
+  std::vector<std::string> notes{};  ///< For the user: guesses, and what is left out.
 };
 
 /// What reading a file may take at most, bytes: a small one may announce any number of points. (LZMA makes 7000 bytes
@@ -43,11 +45,13 @@ bool is_same_mesh(vtkDataSet& a, vtkDataSet& b);
 
 /// Returns the only data set of `pieces`. If there are several, merges them into one unstructured grid, and merges
 /// points at equal positions, which take the values of the first piece in which they are finite. An array that a piece
-/// lacks is NaN there. Tensors whose components have different names there are sorted by them. Null if `pieces` is
-/// empty. Changes the ghost arrays of the pieces. The geometry of the pieces must have passed check_geometry.
+/// lacks is NaN there; a piece's own points go before copies of another's. Where pieces overlap, they share no points,
+/// and an array of cells, layer_array (mesh_tensors.h), says which ones do not overlap. Tensors whose components have
+/// different names there are sorted by them. Null if `pieces` is empty. Changes the ghost arrays of the pieces. The
+/// geometry of the pieces must have passed check_geometry.
 ///
 /// Ghosts of all kinds of data sets mean the same. Of an only data set hidden cells and points stay marked (refined
-/// cells count as hidden), and copies of neighbours' cells and points stay, whose values are right. Of several, hidden
+/// cells count as hidden), and copies of neighbours' cells and points stay where no other cell is. Of several, hidden
 /// cells, cells with hidden points, and copies are removed.
 /// @param merges_points  False: points at equal positions stay apart, where pieces have values of their own.
 vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces, bool merges_points = true);

@@ -30,6 +30,9 @@ class VtkMessages {
   /// @throw std::runtime_error with the first error and the file's name, if there was one.
   void throw_error(const std::filesystem::path& path) const;
 
+  /// Forgets errors and warnings so far.
+  void forget() { error_.clear(), warning_.clear(); }
+
   /// Called by VTK's callbacks. A warning about an error in reading counts as an error.
   void keep(const char* message, bool is_error);
 

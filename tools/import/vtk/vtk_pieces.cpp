@@ -16,6 +16,7 @@
 #include <vtkDataSetAttributes.h>
 #include <vtkIdList.h>
 #include <vtkImageData.h>
+#include <vtkIntArray.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
@@ -25,6 +26,8 @@
 #include <vtkUnstructuredGrid.h>
 
 #include "tools/import/lattices/tensor_order.h"
+#include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/vtk/overlaps.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
@@ -71,6 +74,17 @@ const vtkUnsignedCharArray* ghosts_of(vtkDataSetAttributes& attributes) {
   return vtkUnsignedCharArray::SafeDownCast(attributes.GetArray(vtkDataSetAttributes::GhostArrayName()));
 }
 
+/// Marks points that are copies of another piece's, and may be stale.
+constexpr const char* copied_points = "tensorray:copied";
+
+void mark_copied_points(vtkDataSet& piece, const vtkUnsignedCharArray& ghosts) {
+  vtkNew<vtkUnsignedCharArray> marks;
+  marks->SetName(copied_points);
+  for (vtkIdType i = 0; i < ghosts.GetNumberOfValues(); ++i)
+    marks->InsertNextValue(ghosts.GetValue(i) & vtkDataSetAttributes::DUPLICATEPOINT);
+  piece.GetPointData()->AddArray(marks);
+}
+
 /// The piece without the cells that are to be left out beside other pieces: copies of neighbours' cells, hidden cells,
 /// and those with a hidden point.
 vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
@@ -90,6 +104,7 @@ vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
       is_unused = is_unused || (points->GetValue(ids->GetId(i)) & vtkDataSetAttributes::HIDDENPOINT) != 0;
     marks->InsertNextValue(is_unused ? copy : used);
   }
+  if (points) mark_copied_points(piece, *points);
   for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL})
     piece.GetAttributes(type)->RemoveArray(vtkDataSetAttributes::GhostArrayName());
   vtkNew<vtkAppendFilter> to_unstructured;
@@ -100,6 +115,23 @@ vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
   grid->RemoveGhostCells();  // Those that are marked as copies.
   grid->GetCellData()->RemoveArray(vtkDataSetAttributes::GhostArrayName());
   return grid;
+}
+
+/// Hides copies of cells where the piece has the cells themselves, whose values are never stale.
+void hide_covered_copies(vtkDataSet& piece) {
+  const auto* const ghosts = ghosts_of(*piece.GetCellData());
+  if (!ghosts || !piece.IsA("vtkUnstructuredGrid")) return;
+  const auto copy = vtkSmartPointer<vtkDataSet>::Take(piece.NewInstance());
+  copy->ShallowCopy(&piece);
+  const vtkSmartPointer<vtkDataSet> own = used_part(*copy);
+  if (own->GetNumberOfCells() == 0 || own->GetNumberOfCells() == piece.GetNumberOfCells()) return;
+  CellFinder finder(*own);
+  vtkNew<vtkUnsignedCharArray> marks;
+  marks->DeepCopy(const_cast<vtkUnsignedCharArray*>(ghosts));  // It is only read.
+  for (vtkIdType cell = 0; cell < piece.GetNumberOfCells(); ++cell)
+    if ((ghosts->GetValue(cell) & vtkDataSetAttributes::DUPLICATECELL) != 0 && finder.has(centre_of(piece, cell)))
+      marks->SetValue(cell, ghosts->GetValue(cell) | vtkDataSetAttributes::HIDDENCELL);
+  piece.GetCellData()->AddArray(marks);
 }
 
 /// The arrays with a name, by piece; null where a piece has none.
@@ -186,24 +218,41 @@ bool is_finite(vtkDataArray& array, vtkIdType tuple) {
   return true;
 }
 
-/// Gives each point of `all` the values of the first piece that has it and finite values there. The cells of `all` are
-/// those of the pieces, in their order.
-void take_known_values(vtkUnstructuredGrid& all, const DataSets& pieces,
-                       const std::vector<std::set<std::string>>& known) {
+/// A piece, the arrays of its points that it had from the beginning, and which of its points are copies.
+struct Piece {
+  vtkSmartPointer<vtkDataSet> set;
+  std::set<std::string> known;
+  vtkSmartPointer<vtkUnsignedCharArray> copies;  ///< Null: none.
+};
+
+/// Gives points of `all` the values that the piece with cells from `first` on has there, if they are finite.
+/// @param copies  Of the piece's copies of points alone, or of all others.
+void take_values(vtkUnstructuredGrid& all, vtkIdType first, const Piece& piece, bool copies) {
   vtkNew<vtkIdList> from, to;
-  vtkIdType end = all.GetNumberOfCells();
-  for (std::size_t k = pieces.size(); k-- > 0;) {
-    vtkDataSet& piece = *pieces[k];
-    end -= piece.GetNumberOfCells();
-    for (vtkIdType cell = 0; cell < piece.GetNumberOfCells(); ++cell) {
-      piece.GetCellPoints(cell, from);
-      all.GetCellPoints(end + cell, to);
-      for (const std::string& name : known[k]) {
-        vtkDataArray* const values = piece.GetPointData()->GetArray(name.c_str());
-        vtkDataArray* const merged = all.GetPointData()->GetArray(name.c_str());
-        for (vtkIdType i = 0; merged && i < from->GetNumberOfIds() && i < to->GetNumberOfIds(); ++i)
-          if (is_finite(*values, from->GetId(i))) merged->SetTuple(to->GetId(i), from->GetId(i), values);
+  for (vtkIdType cell = 0; cell < piece.set->GetNumberOfCells(); ++cell) {
+    piece.set->GetCellPoints(cell, from);
+    all.GetCellPoints(first + cell, to);
+    for (const std::string& name : piece.known) {
+      vtkDataArray* const values = piece.set->GetPointData()->GetArray(name.c_str());
+      vtkDataArray* const merged = all.GetPointData()->GetArray(name.c_str());
+      for (vtkIdType i = 0; merged && i < from->GetNumberOfIds() && i < to->GetNumberOfIds(); ++i) {
+        const vtkIdType point = from->GetId(i);
+        if ((piece.copies && piece.copies->GetValue(point) != 0) == copies && is_finite(*values, point))
+          merged->SetTuple(to->GetId(i), point, values);
       }
+    }
+  }
+}
+
+/// Gives each point of `all` the values of the first piece that has it, not as a copy if there is another, and finite
+/// values there. The cells of `all` are those of the pieces, in their order.
+void take_known_values(vtkUnstructuredGrid& all, const std::vector<Piece>& pieces) {
+  for (const bool copies : {true, false}) {
+    vtkIdType end = all.GetNumberOfCells();
+    for (std::size_t k = pieces.size(); k-- > 0;) {
+      end -= pieces[k].set->GetNumberOfCells();
+      if (copies && !pieces[k].copies) continue;
+      take_values(all, end, pieces[k], copies);
     }
   }
 }
@@ -214,6 +263,37 @@ std::set<std::string> point_arrays(vtkDataSet& piece) {
     if (vtkDataArray* const array = piece.GetPointData()->GetArray(i); array && array->GetName())
       names.insert(array->GetName());
   return names;
+}
+
+vtkSmartPointer<vtkUnstructuredGrid> appended(const DataSets& sets, bool merges_points) {
+  vtkNew<vtkAppendFilter> append;
+  append->SetMergePoints(merges_points);
+  append->SetTolerance(0);
+  append->SetOutputPointsPrecision(vtkAlgorithm::DEFAULT_PRECISION);
+  for (vtkDataSet* const set : sets) append->AddInputData(set);
+  append->Update();
+  return append->GetOutput();
+}
+
+/// One grid of pieces that do not overlap.
+vtkSmartPointer<vtkDataSet> merged_layer(const std::vector<Piece>& pieces, bool merges_points) {
+  DataSets sets;
+  for (const Piece& piece : pieces) sets.push_back(piece.set);
+  const vtkSmartPointer<vtkUnstructuredGrid> all = appended(sets, merges_points);
+  take_known_values(*all, pieces);
+  return all;
+}
+
+/// One grid of layers, which share no points, so that none takes values of another, and which its cells name.
+vtkSmartPointer<vtkDataSet> stacked(const DataSets& layers) {
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    vtkNew<vtkIntArray> numbers;
+    numbers->SetName(layer_array);
+    numbers->SetNumberOfValues(layers[i]->GetNumberOfCells());
+    numbers->FillValue(static_cast<int>(i));
+    layers[i]->GetCellData()->AddArray(numbers);
+  }
+  return appended(layers, false);
 }
 
 bool is_same_image(vtkImageData& a, vtkImageData& b) {
@@ -267,26 +347,30 @@ bool is_same_mesh(vtkDataSet& a, vtkDataSet& b) {
 vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& given, bool merges_points) {
   if (given.empty()) return nullptr;
   if (given.size() == 1) {
+    hide_covered_copies(*given.front());
     keep_hidden(*given.front());
     return given.front();
   }
-  DataSets pieces;
-  std::vector<std::set<std::string>> known;
-  for (vtkDataSet* const piece : given) {
-    pieces.push_back(used_part(*piece));
-    known.push_back(point_arrays(*pieces.back()));
+  DataSets sets;
+  for (vtkDataSet* const piece : given) sets.push_back(used_part(*piece));
+  std::vector<Piece> pieces;
+  for (const auto& set : sets) {
+    const vtkSmartPointer<vtkUnsignedCharArray> copies =
+        vtkUnsignedCharArray::SafeDownCast(set->GetPointData()->GetArray(copied_points));
+    set->GetPointData()->RemoveArray(copied_points);
+    pieces.push_back({set, point_arrays(*set), copies});
   }
-  unify_arrays(pieces, vtkDataObject::POINT);
-  unify_arrays(pieces, vtkDataObject::CELL);
-  vtkNew<vtkAppendFilter> append;
-  append->SetMergePoints(merges_points);
-  append->SetTolerance(0);
-  append->SetOutputPointsPrecision(vtkAlgorithm::DEFAULT_PRECISION);
-  for (vtkDataSet* const piece : pieces) append->AddInputData(piece);
-  append->Update();
-  const vtkSmartPointer<vtkUnstructuredGrid> all = append->GetOutput();
-  take_known_values(*all, pieces, known);
-  return all;
+  unify_arrays(sets, vtkDataObject::POINT);
+  unify_arrays(sets, vtkDataObject::CELL);
+  const std::vector<int> layers = overlapping_layers(sets);
+  DataSets merged;
+  for (int layer = 0; layer <= *std::max_element(layers.begin(), layers.end()); ++layer) {
+    std::vector<Piece> of_layer;
+    for (std::size_t k = 0; k < pieces.size(); ++k)
+      if (layers[k] == layer) of_layer.push_back(pieces[k]);
+    merged.push_back(merged_layer(of_layer, merges_points));
+  }
+  return merged.size() == 1 ? merged.front() : stacked(merged);
 }
 
 }  // namespace tensorray

@@ -56,6 +56,7 @@ bool is_ensight(const std::string& head) {
 
 const MeshFormat* format_of_contents(const fs::path& path, const std::string& head) {
   const std::string ending = lower_case_ending(path);
+  if (ending == ".mnc" || ending == ".mat") return nullptr;  // Which are netCDF or HDF5, too.
   if (starts_with(head, "# vtk DataFile Version")) return format_with_ending(".vtk");
   for (const char version : {'\x01', '\x02', '\x05'})
     if (starts_with(head, std::string("CDF") + version)) return format_with_ending(".exo");
@@ -67,6 +68,7 @@ const MeshFormat* format_of_contents(const fs::path& path, const std::string& he
   if (head.find("ADF Database") == 4) return format_with_ending(".cgns");
   if (const MeshFormat* const format = xml_format(path, head)) return format;
   if (head.find("<Xdmf") != std::string::npos) return format_with_ending(".xdmf");
+  if (ending == ".series" && starts_with(trimmed(head), "{")) return format_with_ending(".series");
   if (is_ensight(head)) return format_with_ending(".case");
   return path.filename() == "controlDict" || path.extension() == ".foam" ? format_with_ending(".foam") : nullptr;
 }
@@ -133,9 +135,11 @@ std::string way_out(const std::string& ending, const std::string& name) {
   const std::pair<std::vector<std::string>, std::string> ways[] = {
       {{".msh"},
        "is a mesh of Gmsh, which is not read; run `meshio convert " + name + " FILE.vtu` (Debian's meshio-tools)"},
-      {{".med"},
-       "is a file of MED (Salome, Code_Aster), which is not read; run `meshio convert " + name +
-           " FILE.vtk` (Debian's meshio-tools and python3-h5py)"},
+      {{".med", ".rmed", ".mmed"},
+       "is a file of MED (Salome, Code_Aster), which is not read; save it as .vtu with Salome's ParaViS (File > Save "
+       "Data), or print it in Code_Aster with fields at nodes alone (IMPR_RESU, NOM_CHAM='SIGM_NOEU') and run `meshio "
+       "convert " +
+           name + " FILE.vtk` (Debian's meshio-tools and python3-h5py), which fails on fields at Gauss points"},
       {{".frd"},
        "is a result of CalculiX, which is not read; convert it to .vtu with ccx2paraview, or in FreeCAD (export its "
        "Results)"},
@@ -144,9 +148,30 @@ std::string way_out(const std::string& ending, const std::string& name) {
            "\")[NAME])"},
       {{".dat", ".plt", ".tec", ".szplt"},
        "may be a file of Tecplot, which is not read; open it in ParaView (File > Open, Tecplot reader) and save it as "
-       ".vtu, or .vtm if it has several blocks"}};
+       ".vtu, or .vtm if it has several blocks"},
+      {{".odb"}, "is a result of Abaqus, which only Abaqus reads; make .vtu of it with odb2vtk in Abaqus's own Python"},
+      {{".rst", ".rth"},
+       "is a result of Ansys, which is not read; pip install ansys-mapdl-reader, and then in Python "
+       "ansys.mapdl.reader.read_binary(\"" +
+           name + "\").save_as_vtk(\"FILE.vtu\")"},
+      {{".cas", ".cas.h5", ".dat.h5", ".sim", ".ccm", ".op2", ".d3plot", ".unv", ".res"},
+       "is of a solver's own format, which is not read; save it in the solver, its postprocessor or ParaView as "
+       "EnSight "
+       "Gold (.case), CGNS or .vtu"},
+      {{".mgz", ".mgh"}, "is an image of FreeSurfer, which is not read; run mri_convert " + name + " FILE.nii.gz"},
+      {{".mnc"}, "is an image of MINC, which is not read; run mnc2nii " + name + " FILE.nii"},
+      {{".fib.gz", ".fib", ".fz", ".src.gz", ".sz", ".dcm", ".tck", ".trk"},
+       "holds signals or fibres, and no tensors; fit these to the measured images: dtifit --save_tensor (FSL) or "
+       "dwi2tensor (MRtrix)"},
+      {{".stl", ".ply", ".obj"}, "is a surface, which has no tensors in it; import the grid of the volume"},
+      {{".mat"},
+       "is a file of MATLAB; save its array as .npy: numpy.save(\"FILE.npy\", scipy.io.loadmat(\"" + name +
+           "\")[NAME])"},
+      {{".vdb"}, "is an OpenVDB file, which needs no import: name it in the scene (field.file)"}};
   for (const auto& [endings, way] : ways)
-    if (std::count(endings.begin(), endings.end(), ending) > 0) return way;
+    if (std::any_of(endings.begin(), endings.end(),
+                    [&](const std::string& one) { return ending == one || ends_with(lower_case(name), one); }))
+      return way;
   return {};
 }
 
@@ -161,7 +186,7 @@ const MeshFormat& checked_format(const fs::path& path) {
   if (head.empty() && promised != format_with_ending(".foam")) fail(path, "is empty; write it again");
   if (!found && promised) fail(path, "is not " + promised->text + ", as its ending says");
   if (const std::string way = way_out(ending, path.filename().string());
-      !way.empty() && (!found || ending == ".med"))  // MED is HDF5, too.
+      !way.empty() && (!found || ends_with(ending, "med")))  // MED is HDF5, too.
     fail(path, way);
   if (!found)
     fail(path,

@@ -12,13 +12,13 @@
 #include <vtkCompositeDataSet.h>
 #include <vtkDataSet.h>
 #include <vtkDataSetReader.h>
-#include <vtkExodusIIReader.h>
 #include <vtkInformation.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkOpenFOAMReader.h>
 #include <vtkSmartPointer.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
+#include <vtkUnstructuredGrid.h>
 #include <vtkXMLGenericDataObjectReader.h>
 
 #include "base/errors.h"
@@ -26,11 +26,14 @@
 #include "base/text/short_lines.h"
 #include "base/text/text.h"
 #include "tools/import/cases/ensight.h"
+#include "tools/import/cases/exodus.h"
 #include "tools/import/cases/openfoam.h"
+#include "tools/import/cases/openfoam_walls.h"
 #include "tools/import/hdf5/hdf5_meshes.h"
+#include "tools/import/meshes/cell_graph.h"
+#include "tools/import/vtk/polyhedra.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk_formats/array_names.h"
-#include "tools/import/vtk_formats/netcdf_end.h"
 #include "tools/import/vtk_formats/vtk_tags.h"
 
 namespace tensorray {
@@ -49,12 +52,16 @@ MeshFile open_xml(const Path& path) {
   return {1, [path](int) { return read_xml(path); }};
 }
 
+MeshFile open_unstructured(const Path& path) {
+  return {1, [path](int) { return read_vtu(path); }};
+}
+
 /// Reads piece by piece, because VTK's own reader of pieces duplicates the points on every seam.
 MeshFile open_unstructured_pieces(const Path& path) {
   return {1, [path](int) {
             auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();
             unsigned int index = 0;
-            for (const Path& piece : piece_files(path)) blocks->SetBlock(index++, read_xml(piece));
+            for (const Path& piece : piece_files(path)) blocks->SetBlock(index++, read_vtu(piece));
             return blocks;
           }};
 }
@@ -93,28 +100,6 @@ MeshFile open_legacy(const Path& path) {
             reader->ReadAllFieldsOn();
             reader->Update();
             for (vtkDataSet* const set : data_sets_in(reader->GetOutputDataObject(0))) name_tensors6(*set, path);
-            return reader->GetOutputDataObject(0);
-          }};
-}
-
-/// Reads the undisplaced mesh. By default VTK moves its points by any array that looks like a displacement.
-MeshFile open_exodus(const Path& path) {
-  require_whole_netcdf(path);
-  const auto reader = vtkSmartPointer<vtkExodusIIReader>::New();
-  reader->SetFileName(path.c_str());
-  reader->ApplyDisplacementsOff();
-  reader->UpdateInformation();
-  const int steps = reader->GetNumberOfTimeSteps();
-  return {steps, [=](int step) -> vtkSmartPointer<vtkDataObject> {
-            for (const auto kind : {vtkExodusIIReader::NODAL, vtkExodusIIReader::ELEM_BLOCK})
-              for (int i = 0; i < reader->GetNumberOfObjectArrays(kind); ++i)
-                reader->SetObjectArrayStatus(kind, reader->GetObjectArrayName(kind, i), 1);
-            for (int i = 0; i < reader->GetNumberOfObjects(vtkExodusIIReader::ELEM_BLOCK); ++i)
-              reader->SetObjectStatus(vtkExodusIIReader::ELEM_BLOCK, i, 1);
-            if (steps > 0) reader->SetTimeStep(step);
-            reader->Update();
-            for (vtkDataSet* const set : data_sets_in(reader->GetOutputDataObject(0)))
-              name_components(*set, *reader, path);
             return reader->GetOutputDataObject(0);
           }};
 }
@@ -173,6 +158,8 @@ vtkSmartPointer<vtkMultiBlockDataSet> read_case(const Path& folder, const OpenFo
   reader->EnableAllPointArrays();
   // The file has values at cells; they are averaged to points where cells are known to be finite.
   reader->CreateCellToPointOff();
+  // Of the parts of a polyhedron each would have its value, and a gradient beside it.
+  reader->DecomposePolyhedraOff();
   reader->UpdateTimeStep(time.value);
   reader->Update();
   complete_fields(*reader->GetOutput(), folder / time.folder);
@@ -183,6 +170,7 @@ vtkSmartPointer<vtkMultiBlockDataSet> read_case(const Path& folder, const OpenFo
 vtkSmartPointer<vtkDataObject> read_regions(const OpenFoamParts& parts, const OpenFoamTime& time) {
   const TemporaryFolder folder;
   std::map<std::string, DataSets> regions;  // A processor may have no part of a region.
+  OpenFoamWalls walls;
   for (const Path& one :
        parts.processors.empty() ? std::vector{parts.folder} : processor_cases(parts, time, folder / "")) {
     const vtkSmartPointer<vtkMultiBlockDataSet> blocks = read_case(one, time);
@@ -191,10 +179,13 @@ vtkSmartPointer<vtkDataObject> read_regions(const OpenFoamParts& parts, const Op
         check_geometry(*set, parts.folder);
         regions[block_name(*blocks, i)].push_back(set);
       }
+    add_openfoam_walls(one, time, walls);
   }
   DataSets merged;
   for (const auto& [name, sets] : regions) merged.push_back(one_data_set(sets));
-  return one_data_set(merged, false);
+  const vtkSmartPointer<vtkDataSet> all = one_data_set(merged, false);
+  for (const auto& [field, of_field] : walls) add_walls(*all, field, of_field);
+  return all;
 }
 
 /// @param path  The case's folder, a .foam file in it, or its system/controlDict.
@@ -215,7 +206,7 @@ const std::vector<MeshFormat>& mesh_formats() {
       {"a VTK image", "ImageData", {".vti"}, open_xml},
       {"a VTK rectilinear grid", "RectilinearGrid", {".vtr"}, open_xml},
       {"a VTK structured grid", "StructuredGrid", {".vts"}, open_xml},
-      {"a VTK unstructured grid", "UnstructuredGrid", {".vtu"}, open_xml},
+      {"a VTK unstructured grid", "UnstructuredGrid", {".vtu"}, open_unstructured},
       {"a VTK image in pieces", "PImageData", {".pvti"}, open_xml, true},
       {"a VTK rectilinear grid in pieces", "PRectilinearGrid", {".pvtr"}, open_xml, true},
       {"a VTK structured grid in pieces", "PStructuredGrid", {".pvts"}, open_xml, true},
@@ -228,6 +219,7 @@ const std::vector<MeshFormat>& mesh_formats() {
       {"a VTKHDF file", "", {".vtkhdf", ".hdf"}, open_vtkhdf, true},
       {"a VTK multi-block file", "vtkMultiBlockDataSet", {".vtm"}},
       {"a ParaView collection", "Collection", {".pvd"}},
+      {"a series of files", "", {".series"}},
   };
   return formats;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <new>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
 #include <vtkDataSet.h>
 #include <vtkSmartPointer.h>
 #include <vtkXMLDataElement.h>
@@ -54,10 +56,30 @@ void collect(vtkXMLDataElement& element, const Path& path, FilesByTime& steps) {
   }
 }
 
-/// The files of volumes, each once, that a collection (.vtm, .pvd) names for each step of time, in the order of times.
-/// A .vtm has one step, with all of its blocks. Surfaces (.vtp) are left out, because exporters put a body's patches
-/// beside its volume.
+/// The files of a series (.series), in the order of their times.
+std::vector<std::vector<Path>> series_steps(const Path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const auto json = nlohmann::json::parse(file, nullptr, false);
+  std::vector<std::pair<double, Path>> files;
+  try {
+    for (const auto& each : json.at("files"))
+      files.emplace_back(each.value("time", static_cast<double>(files.size())),
+                         path.parent_path() / each.at("name").get<std::string>());
+  } catch (const nlohmann::json::exception&) {
+    files.clear();
+  }
+  if (files.empty()) fail(path, "is damaged, or names no files; write it again");
+  std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<std::vector<Path>> steps;
+  for (const auto& [time, name] : files) steps.push_back({name.lexically_normal()});
+  return steps;
+}
+
+/// The files of volumes, each once, that a collection (.vtm, .pvd, .series) names for each step of time, in the order
+/// of times. A .vtm has one step, with all of its blocks. Surfaces (.vtp) are left out, because exporters put a body's
+/// patches beside its volume.
 std::vector<std::vector<Path>> collection_steps(const Path& path) {
+  if (lower_case_ending(path) == ".series") return series_steps(path);
   const auto root = vtkSmartPointer<vtkXMLDataElement>::Take(vtkXMLUtilities::ReadElementFromFile(path.c_str()));
   if (!root) fail(path, "is damaged: it is no XML; write it again");
   FilesByTime by_time;
@@ -78,19 +100,46 @@ std::size_t chosen_step(std::size_t steps, std::optional<int> step) {
 
 std::size_t steps_in(const MeshFile& file) { return static_cast<std::size_t>(std::max(1, file.steps)); }
 
-DataSets read_data_sets(const Path& path, const MeshFormat& format, const VtkMessages& messages,
-                        std::optional<int> step);
+/// What a file is read for: VTK's errors, and notes for the user.
+struct Reading {
+  VtkMessages messages;
+  std::vector<std::string> notes;
+};
+
+/// Reads the chosen step, or the last one that can be read. An error that stays the same from a step to the one before
+/// is not one of the step.
+template <class Read>
+DataSets read_step(const Path& path, std::size_t steps, std::optional<int> step, Reading& reading, const Read& read) {
+  const std::size_t last = chosen_step(steps, step);
+  std::string first_error, error_after;
+  for (std::size_t at = last;; --at) {
+    try {
+      DataSets sets = read(at);
+      reading.messages.throw_error(path);
+      if (steps > 1 && !step)
+        reading.notes.push_back(
+            "step " + std::to_string(at + 1) + " of " + std::to_string(steps) + " is taken" +
+            (at < last ? ", as those after it are not complete: " + first_error : "; --steps chooses another one"));
+      return sets;
+    } catch (const std::runtime_error& error) {
+      if (first_error.empty()) first_error = error.what();
+      if (step || at == 0 || error.what() == error_after) throw std::runtime_error(first_error);
+      error_after = error.what();
+      reading.messages.forget();
+    }
+  }
+}
+
+DataSets read_data_sets(const Path& path, const MeshFormat& format, Reading& reading, std::optional<int> step);
 
 /// Those of all files that a collection names for a step.
-DataSets read_collection(const Path& path, const MeshFormat& format, const VtkMessages& messages,
-                         std::optional<int> step) {
-  const std::vector<std::vector<Path>> steps = collection_steps(path);
+DataSets read_collection(const Path& path, const MeshFormat& format, const std::vector<Path>& named, Reading& reading) {
   DataSets sets;
   std::vector<Path> files;  // Of the data sets.
-  for (const Path& file : steps[chosen_step(steps.size(), step)]) {
+  for (const Path& file : named) {
     const MeshFormat& of_file = find_format(file);
     if (&of_file >= &format) fail(path, "names the collection " + escaped(file.string()) + "; import that one");
-    for (const auto& set : read_data_sets(file, of_file, messages, std::nullopt)) {
+    for (const auto& set : read_data_sets(file, of_file, reading, std::nullopt)) {
       for (std::size_t i = 0; i < sets.size(); ++i)
         if (files[i] != file && is_same_mesh(*sets[i], *set))
           fail(path, "names the same mesh twice for one time, as " + escaped(files[i].filename().string()) +
@@ -103,35 +152,43 @@ DataSets read_collection(const Path& path, const MeshFormat& format, const VtkMe
 }
 
 /// The sound data sets with cells of a file, or of the files that it names.
-DataSets read_data_sets(const Path& path, const MeshFormat& format, const VtkMessages& messages,
-                        std::optional<int> step) {
-  if (!format.open) return read_collection(path, format, messages, step);
+DataSets read_data_sets(const Path& path, const MeshFormat& format, Reading& reading, std::optional<int> step) {
+  if (!format.open) {
+    const std::vector<std::vector<Path>> steps = collection_steps(path);
+    return read_step(path, steps.size(), step, reading,
+                     [&](std::size_t at) { return read_collection(path, format, steps[at], reading); });
+  }
   std::optional<ExtraMemoryLimit> limit;
   if (!format.has_other_files) limit.emplace(max_memory_of(path));
   const MeshFile file = format.open(path);
-  const DataSets sets = data_sets_in(file.read(static_cast<int>(chosen_step(steps_in(file), step))));
-  messages.throw_error(path);
-  for (vtkDataSet* const set : sets) {
-    check_geometry(*set, path);
-    name_active_tensors(*set);
-  }
-  return sets;
+  reading.notes.insert(reading.notes.end(), file.notes.begin(), file.notes.end());
+  return read_step(path, steps_in(file), step, reading, [&](std::size_t at) {
+    const DataSets sets = data_sets_in(file.read(static_cast<int>(at)));
+    reading.messages.throw_error(path);
+    for (vtkDataSet* const set : sets) {
+      check_geometry(*set, path);
+      name_active_tensors(*set);
+    }
+    return sets;
+  });
 }
 
 }  // namespace
 
-vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path, std::optional<int> step) {
+vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path, std::optional<int> step,
+                                            std::vector<std::string>* notes) {
   const MeshFormat& format = find_format(path);
-  const VtkMessages messages;
+  Reading reading;
   vtkSmartPointer<vtkDataSet> result;
   try {
-    result = one_data_set(read_data_sets(path, format, messages, step));
+    result = one_data_set(read_data_sets(path, format, reading, step));
   } catch (const std::bad_alloc&) {
     throw std::runtime_error(path.string() + ": is damaged, or too large: it announces more than memory holds");
   }
-  messages.throw_error(path);
+  if (notes) *notes = reading.notes;
+  reading.messages.throw_error(path);
   if (!result) {
-    const std::string& warning = messages.first_warning();
+    const std::string& warning = reading.messages.first_warning();
     throw std::runtime_error(path.string() + ": holds no cells" + (warning.empty() ? "" : ": " + warning));
   }
   return result;

@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 class vtkDataSet;
 template <class T>
@@ -25,9 +27,12 @@ namespace tensorray {
 /// type, also if they are in pieces. Ghosts: see vtk_data_sets.h. The kind is found from the contents where they state
 /// it; a wrong ending is an error that names both kinds. On damaged files VTK's readers may end the process or never
 /// return: call this in a child process (child_process.h). The result has passed check_geometry (vtk_data_sets.h).
-/// @param step  Of the steps of time, from 0 on; none: the last one.
+/// @param step  Of the steps of time, from 0 on; none: the last one that can be read, as a run that was stopped leaves
+/// its last ones incomplete.
+/// @param notes  Gets lines for the user: guesses, what is left out, and steps that are not complete.
 /// @throw std::runtime_error, one line with the file and the fix; it includes the messages that VTK would print.
-vtkSmartPointer<vtkDataSet> read_vtk_source(const std::filesystem::path& path, std::optional<int> step = std::nullopt);
+vtkSmartPointer<vtkDataSet> read_vtk_source(const std::filesystem::path& path, std::optional<int> step = std::nullopt,
+                                            std::vector<std::string>* notes = nullptr);
 
 /// The number of steps of time in a file; 1 for kinds that have none. @throw as read_vtk_source.
 int time_steps(const std::filesystem::path& path);

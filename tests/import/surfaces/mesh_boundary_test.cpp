@@ -1,4 +1,4 @@
-#include "tools/import/meshes/mesh_boundary.h"
+#include "tools/import/surfaces/mesh_boundary.h"
 
 #include <cmath>
 #include <fstream>

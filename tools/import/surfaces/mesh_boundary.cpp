@@ -1,4 +1,4 @@
-#include "tools/import/meshes/mesh_boundary.h"
+#include "tools/import/surfaces/mesh_boundary.h"
 
 #include <algorithm>
 #include <array>
@@ -6,115 +6,36 @@
 #include <cstdint>
 #include <map>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include <vtkDataSet.h>
 #include <vtkIdList.h>
 #include <vtkPoints.h>
-#include <vtkPolyData.h>
-#include <vtkStaticPointLocator.h>
 
 #include "base/constants.h"
 #include "base/geometry/ply_writer.h"
 #include "base/geometry/triangle_mesh.h"
 #include "tools/import/meshes/mesh_cell.h"
+#include "tools/import/surfaces/mesh_faces.h"
 
 namespace tensorray {
 namespace {
 
 using Eigen::Vector3d;
 
-/// The points of a mesh, and for each point the one that represents all points at the same position.
-struct Points {
-  std::vector<Vector3d> positions;
-  std::vector<vtkIdType> same;
-};
-
-/// A face of a cell. Its key is its four lowest points: four points of a polygon distinguish it from its neighbours.
-struct Face {
-  std::array<vtkIdType, 4> key;
-  vtkIdType cell = 0;
-  int index = 0;
-
-  bool operator<(const Face& other) const {
-    return std::tie(key, cell, index) < std::tie(other.key, other.cell, other.index);
-  }
-};
-
-Points points_of(vtkDataSet& mesh) {
-  Points points;
-  const vtkIdType count = mesh.GetNumberOfPoints();
-  points.positions.resize(static_cast<std::size_t>(count));
-  points.same.resize(static_cast<std::size_t>(count));
-  vtkNew<vtkPoints> positions;
-  positions->SetDataTypeToDouble();
-  positions->SetNumberOfPoints(count);
-  for (vtkIdType i = 0; i < count; ++i) {
-    Vector3d& position = points.positions[static_cast<std::size_t>(i)];
-    mesh.GetPoint(i, position.data());
-    positions->SetPoint(i, position.data());
-  }
-  vtkNew<vtkPolyData> cloud;
-  cloud->SetPoints(positions);
-  vtkNew<vtkStaticPointLocator> locator;
-  locator->SetDataSet(cloud);
-  locator->BuildLocator();
-  locator->MergePoints(0, points.same.data());
-  return points;
-}
-
-/// @return false if the face has no area, because it is an edge or a point.
-bool find_key(vtkIdList& ids, const Points& points, std::array<vtkIdType, 4>& key) {
-  std::vector<vtkIdType> distinct;
-  for (vtkIdType i = 0; i < ids.GetNumberOfIds(); ++i)
-    distinct.push_back(points.same[static_cast<std::size_t>(ids.GetId(i))]);
-  std::sort(distinct.begin(), distinct.end());
-  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  if (distinct.size() < 3) return false;
-  key.fill(-1);
-  std::copy_n(distinct.begin(), std::min(distinct.size(), key.size()), key.begin());
-  return true;
-}
-
-/// The faces that belong to only one cell.
-std::vector<Face> outer_faces(vtkDataSet& mesh, const Points& points) {
-  std::vector<Face> faces;
-  MeshCell cell;
-  for (vtkIdType id = 0; id < mesh.GetNumberOfCells(); ++id) {
-    if (!cell.load(mesh, id)) continue;
-    for (int i = 0; i < cell.vtk().GetNumberOfFaces(); ++i) {
-      Face face{{}, id, i};
-      if (find_key(*cell.vtk().GetFace(i)->GetPointIds(), points, face.key)) faces.push_back(face);
-    }
-  }
-  if (faces.empty()) throw std::invalid_argument("the mesh has no three-dimensional cells: it lies around no body");
-  std::sort(faces.begin(), faces.end());
-  std::vector<Face> outer;
-  for (std::size_t i = 0; i < faces.size();) {
-    std::size_t next = i + 1;
-    while (next < faces.size() && faces[next].key == faces[i].key) ++next;
-    if (next == i + 1) outer.push_back(faces[i]);
-    i = next;
-  }
-  std::sort(outer.begin(), outer.end(),
-            [](const Face& a, const Face& b) { return std::tie(a.cell, a.index) < std::tie(b.cell, b.index); });
-  return outer;
-}
-
 /// For each of many directions, the point of the faces that is farthest in that direction. For any plane, these
 /// include a point that is nearly the farthest in front of it: the error is at most 1 − cos of half the directions'
 /// spacing (4e-4 of the diagonal). All results are points of the mesh.
-Eigen::Matrix3Xd extreme_points(vtkDataSet& mesh, const std::vector<Face>& faces, const Points& points) {
+Eigen::Matrix3Xd extreme_points(vtkDataSet& mesh, const std::vector<CellFace>& faces, const MeshPoints& points) {
   std::vector<Vector3d> candidates;
   std::vector<bool> seen(points.positions.size(), false);
   MeshCell cell;
-  for (const Face& face : faces) {
+  for (const CellFace& face : faces) {
     cell.load(mesh, face.cell);
     vtkIdList& ids = *cell.vtk().GetFace(face.index)->GetPointIds();
     for (vtkIdType i = 0; i < ids.GetNumberOfIds(); ++i) {
-      const auto id = static_cast<std::size_t>(points.same[static_cast<std::size_t>(ids.GetId(i))]);
+      const auto id = static_cast<std::size_t>(points.representative(ids.GetId(i)));
       if (!seen[id]) candidates.push_back(points.positions[id]);
       seen[id] = true;
     }
@@ -146,18 +67,16 @@ struct FacePlane {
   double outmost = 0;  ///< Position along the normal of the face's own point that is farthest out of the cell.
 };
 
-FacePlane plane_of(const MeshCell& cell, int index, const Points& points) {
+FacePlane plane_of(const MeshCell& cell, int index, const MeshPoints& points) {
   FacePlane plane;
   Vector3d centre = Vector3d::Zero();
   vtkNew<vtkIdList> ids;
   vtkNew<vtkPoints> unused;
   cell.vtk().GetFace(index)->Triangulate(0, ids, unused);
-  const auto position = [&](vtkIdType id) { return points.positions[static_cast<std::size_t>(id)]; };
   for (vtkIdType i = 0; i + 2 < ids->GetNumberOfIds(); i += 3) {
     std::array<vtkIdType, 3> triangle{};
-    for (std::size_t k = 0; k < 3; ++k)
-      triangle[k] = points.same[static_cast<std::size_t>(ids->GetId(i + static_cast<vtkIdType>(k)))];
-    const Vector3d a = position(triangle[0]), b = position(triangle[1]), c = position(triangle[2]);
+    for (std::size_t k = 0; k < 3; ++k) triangle[k] = points.representative(ids->GetId(i + static_cast<vtkIdType>(k)));
+    const Vector3d a = points[triangle[0]], b = points[triangle[1]], c = points[triangle[2]];
     const Vector3d area = (b - a).cross(c - a);
     if (area.isZero(0)) continue;
     plane.triangles.push_back(triangle);
@@ -173,19 +92,22 @@ FacePlane plane_of(const MeshCell& cell, int index, const Points& points) {
   }
   plane.outmost = plane.normal.dot(centre);
   for (const auto& triangle : plane.triangles)
-    for (const vtkIdType id : triangle) plane.outmost = std::min(plane.outmost, plane.normal.dot(position(id)));
+    for (const vtkIdType id : triangle) plane.outmost = std::min(plane.outmost, plane.normal.dot(points[id]));
   return plane;
 }
 
-TriangleMesh body_surface(vtkDataSet& mesh) {
-  const Points points = points_of(mesh);
-  const std::vector<Face> faces = outer_faces(mesh, points);
+TriangleMesh surrounded_surface(vtkDataSet& mesh) {
+  const MeshPoints points = points_of(mesh);
+  // VTK lists no faces of convex point sets.
+  const std::vector<CellFace> faces = outer_faces(
+      mesh, points, [](const MeshCell& cell, vtkIdType) { return cell.vtk().GetCellType() != VTK_CONVEX_POINT_SET; });
+  if (faces.empty()) throw std::invalid_argument("the mesh has no three-dimensional cells: it lies around no body");
   const Eigen::Matrix3Xd extreme = extreme_points(mesh, faces, points);
   const double min_depth = 1e-3 * (extreme.rowwise().maxCoeff() - extreme.rowwise().minCoeff()).norm();
   TriangleMesh surface;
   std::map<vtkIdType, std::uint32_t> vertex_of_point;
   MeshCell cell;
-  for (const Face& face : faces) {
+  for (const CellFace& face : faces) {
     cell.load(mesh, face.cell);
     const FacePlane plane = plane_of(cell, face.index, points);
     const double depth = plane.outmost - (plane.normal.transpose() * extreme).minCoeff();
@@ -195,7 +117,7 @@ TriangleMesh body_surface(vtkDataSet& mesh) {
       for (std::size_t k = 0; k < 3; ++k) {
         const auto [vertex, is_new] =
             vertex_of_point.try_emplace(triangle[k], static_cast<std::uint32_t>(surface.vertices.size()));
-        if (is_new) surface.vertices.push_back(points.positions[static_cast<std::size_t>(triangle[k])]);
+        if (is_new) surface.vertices.push_back(points[triangle[k]]);
         vertices[k] = vertex->second;
       }
       surface.triangles.push_back(vertices);
@@ -207,7 +129,7 @@ TriangleMesh body_surface(vtkDataSet& mesh) {
 }  // namespace
 
 std::size_t write_boundary(vtkDataSet& mesh, const std::filesystem::path& path) {
-  const TriangleMesh surface = body_surface(mesh);
+  const TriangleMesh surface = surrounded_surface(mesh);
   if (!surface.triangles.empty()) write_ply(path, surface, PlyPositions::double_precision);
   return surface.triangles.size();
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/import/meshes/mesh_boundary.h
+/// @file tools/import/surfaces/mesh_boundary.h
 /// The surface of the body inside a mesh.
 
 #include <cstddef>

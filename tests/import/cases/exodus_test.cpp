@@ -1,0 +1,260 @@
+// ExodusII files whose writer was stopped, or which announce what they do not hold; and pieces of Nemesis.
+
+#include "tools/import/cases/exodus.h"
+
+#include <array>
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <vtkDataSet.h>
+#include <vtk_exodusII.h>
+#include <vtk_netcdf.h>
+
+#include "base/process/progress.h"
+#include "tests/import/mesh_files.h"
+#include "tests/import/mesh_fixtures.h"
+#include "tools/import/import_file.h"
+#include "tools/import/vtk_source/vtk_source.h"
+
+namespace tensorray {
+namespace {
+
+using namespace mesh_fixtures;
+using testing::HasSubstr;
+using Path = std::filesystem::path;
+
+/// A row of unit cubes from x = first on. At step k from 1 on, the gradient of v is k diag(1, 2, 3), and the stress of
+/// all cells is k (11, 22, 33, 12, 23, 13). @param mode  EX_LARGE_MODEL or EX_NETCDF4.
+void write_bar(const Path& path, int steps, int mode = EX_LARGE_MODEL, int first = 0, int cubes = 2) {
+  int word = 8, stored = 8;
+  const int file = ex_create(path.c_str(), EX_CLOBBER | mode, &word, &stored), nodes = 4 * (cubes + 1);
+  ASSERT_GE(file, 0);
+  std::array<std::vector<double>, 3> x;
+  std::vector<int> corners;
+  for (int i = 0; i < nodes; ++i)
+    for (int axis = 0; axis < 3; ++axis) x[axis].push_back(axis == 0 ? first + i / 4 : axis == 1 ? i % 2 : i % 4 / 2);
+  for (int cube = 0; cube < cubes; ++cube)
+    for (const int corner : {1, 5, 6, 2, 3, 7, 8, 4}) corners.push_back(4 * cube + corner);
+  ex_put_init(file, "bar", 3, nodes, cubes, 1, 0, 0);
+  ex_put_coord(file, x[0].data(), x[1].data(), x[2].data());
+  ex_put_block(file, EX_ELEM_BLOCK, 7, "HEX8", cubes, 8, 0, 0, 0);
+  ex_put_conn(file, EX_ELEM_BLOCK, 7, corners.data(), nullptr, nullptr);
+  ex_put_variable_param(file, EX_NODAL, 3);
+  ex_put_variable_param(file, EX_ELEM_BLOCK, 6);
+  const std::array<const char*, 6> stress{"s_xx", "s_yy", "s_zz", "s_xy", "s_yz", "s_xz"};
+  const std::array<double, 6> components{11, 22, 33, 12, 23, 13};
+  for (int i = 0; i < 3; ++i) ex_put_variable_name(file, EX_NODAL, i + 1, std::array{"v_x", "v_y", "v_z"}[i]);
+  for (int i = 0; i < 6; ++i) ex_put_variable_name(file, EX_ELEM_BLOCK, i + 1, stress[i]);
+  std::vector<int> table(6, 1);
+  ex_put_truth_table(file, EX_ELEM_BLOCK, 1, 6, table.data());
+  for (int step = 1; step <= steps; ++step) {
+    const double time = 0.5 * step;
+    ex_put_time(file, step, &time);
+    for (int i = 0; i < 3; ++i) {
+      std::vector<double> values = x[i];
+      for (double& value : values) value *= step * (i + 1);
+      ex_put_var(file, step, EX_NODAL, i + 1, 1, nodes, values.data());
+    }
+    for (int i = 0; i < 6; ++i)
+      ex_put_var(file, step, EX_ELEM_BLOCK, i + 1, 7, cubes, std::vector<double>(cubes, step * components[i]).data());
+  }
+  ex_close(file);
+}
+
+/// Changes a file by netCDF's functions.
+void change(const Path& path, const std::function<void(int)>& act) {
+  int file = 0;
+  ASSERT_EQ(nc_open(path.c_str(), NC_WRITE, &file), NC_NOERR);
+  act(file);
+  nc_close(file);
+}
+
+/// Writes a value to all numbers of a variable at a step, from 1 on.
+void fill(const Path& path, const std::string& name, std::size_t step, double value = NC_FILL_DOUBLE) {
+  change(path, [&](int file) {
+    int id = -1, rank = 0, dimensions[8];
+    ASSERT_EQ(nc_inq_varid(file, name.c_str(), &id), NC_NOERR) << name;
+    nc_inq_var(file, id, nullptr, nullptr, &rank, dimensions, nullptr);
+    std::vector<std::size_t> start(rank, 0), count(rank, 1);
+    std::size_t size = 1;
+    for (int i = 1; i < rank; ++i) {
+      nc_inq_dimlen(file, dimensions[i], &count[i]);
+      size *= count[i];
+    }
+    start[0] = step - 1;
+    nc_put_vara_double(file, id, start.data(), count.data(), std::vector<double>(size, value).data());
+  });
+}
+
+void set_aside(const Path& path, const std::string& name) {
+  change(path, [&](int file) {
+    int id = -1;
+    nc_redef(file);
+    ASSERT_EQ(nc_inq_varid(file, name.c_str(), &id), NC_NOERR) << name;
+    EXPECT_EQ(nc_rename_var(file, id, "other"), NC_NOERR);
+  });
+}
+
+struct Imported {
+  Matrix3d tensor = Matrix3d::Zero();  ///< At all voxels.
+  std::size_t cells = 0, voxels = 0;
+  std::string notes;
+};
+
+Imported import(const std::vector<Path>& files, const std::string& array, Take take, std::optional<int> step = {}) {
+  ImportSettings settings;
+  settings.files = files;
+  settings.array = array;
+  settings.take = take;
+  settings.step = step;
+  settings.sampling.resolution = 0.5;
+  ImportReport report;
+  Imported result;
+  const TensorGrid grid = import_tensors(settings, Progress(), report);
+  for_each_voxel(grid, [&](const auto&, const Matrix3d& value) { result.tensor = value; });
+  for_each_voxel(grid, [&](const auto&, const Matrix3d& value) { EXPECT_LT((value - result.tensor).norm(), 1e-5); });
+  for (const std::string& note : report.notes) result.notes += note + "\n";
+  result.cells = report.mesh_cells;
+  result.voxels = grid.active_voxels();
+  return result;
+}
+
+std::string refusal(const Path& path, const char* array, Take take) {
+  try {
+    import({path}, array, take);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return {};
+}
+
+const char* const stress_list = "s_xx,s_yy,s_zz,s_xy,s_yz,s_xz";
+
+/// Expects v and the stress of a step, from 1 on. @return the notes.
+std::string expect_step(const Path& path, int step, std::optional<int> asked = {}) {
+  Matrix3d stress;
+  stress << 11, 12, 13, 12, 22, 23, 13, 23, 33;
+  const Matrix3d gradient = Eigen::Vector3d(1, 2, 3).asDiagonal();
+  const Imported v = import({path}, "v_", Take::gradient, asked), s = import({path}, stress_list, Take::tensor, asked);
+  EXPECT_LT((v.tensor - step * gradient).norm(), 1e-5) << path;
+  EXPECT_LT((s.tensor - step * stress).norm(), 1e-4) << path;
+  EXPECT_EQ(v.notes, s.notes);
+  return v.notes;
+}
+
+constexpr std::array modes{EX_LARGE_MODEL, EX_NETCDF4};
+
+TEST(Exodus, TheLastCompleteStepIsTaken) {
+  const TemporaryFolder folder;
+  const Path path = folder / "a.e";
+  struct Row {
+    const char* name;
+    int last;  ///< Complete step of four.
+    std::function<void()> spoil;
+    const char* words;
+  };
+  const Row table[] = {{"nothing", 4, [] {}, "; --steps chooses another one"},
+                       {"its time", 3, [&] { fill(path, "time_whole", 4); }, "its time was not written"},
+                       {"a time of zero", 3, [&] { fill(path, "time_whole", 4, 0); }, "its time"},
+                       {"nodes", 3, [&] { fill(path, "vals_nod_var2", 4); }, "was not written"},
+                       {"cells", 3, [&] { fill(path, "vals_elem_var3eb1", 4); }, "\"s_zz\" was not written"},
+                       {"two steps", 2,
+                        [&] {
+                          fill(path, "vals_nod_var1", 3);
+                          fill(path, "time_whole", 4);
+                        },
+                        "its time"}};
+  for (const int mode : modes)
+    for (const Row& row : table) {
+      write_bar(path, 4, mode);
+      row.spoil();
+      const std::string notes = expect_step(path, row.last);
+      EXPECT_THAT(notes, HasSubstr("step " + std::to_string(row.last) + " of 4 is taken")) << row.name;
+      if (row.last == 4) continue;
+      EXPECT_THAT(notes, HasSubstr(row.words)) << row.name;
+      const std::string asked = error_of([&] { import({path}, "v_", Take::gradient, 3); });
+      EXPECT_THAT(asked, AllOf(HasSubstr("a.e: step 4 of 4 is not complete: "), HasSubstr("--steps"))) << row.name;
+      EXPECT_EQ(expect_step(path, 1, 0), "");
+    }
+}
+
+/// The same variable may be missing at every step, and an only step may have no time.
+TEST(Exodus, FillValuesAreHoles) {
+  const TemporaryFolder folder;
+  write_bar(folder / "a.e", 1);
+  fill(folder / "a.e", "time_whole", 1);
+  EXPECT_EQ(expect_step(folder / "a.e", 1), "");
+  fill(folder / "a.e", "vals_nod_var1", 1);
+  EXPECT_THAT(refusal(folder / "a.e", "v_", Take::gradient), HasSubstr("have NaN or infinite tensors"));
+  EXPECT_GT(import({folder / "a.e"}, stress_list, Take::tensor).voxels, 0u);
+}
+
+TEST(Exodus, VariablesThatAreNotThereAreLeftOut) {
+  const TemporaryFolder folder;
+  const Path path = folder / "a.e";
+  const auto left_out = [](const char* name) { return AllOf(HasSubstr("no array"), HasSubstr(name)); };
+  write_bar(path, 2);
+  set_aside(path, "vals_nod_var2");
+  EXPECT_THAT(refusal(path, "v_", Take::gradient), left_out("left out: \"v_y\""));
+  EXPECT_NEAR(import({path}, stress_list, Take::tensor).tensor(0, 0), 22, 1e-4);
+  write_bar(path, 2);
+  set_aside(path, "vals_elem_var2eb1");
+  EXPECT_THAT(refusal(path, stress_list, Take::tensor), left_out("left out: \"s_yy\""));
+  EXPECT_NEAR(import({path}, "v_", Take::gradient).tensor(1, 1), 4, 1e-4);
+  write_bar(path, 2);
+  set_aside(path, "vals_nod_var2");
+  change(path, [](int file) {  // As numbers of other nodes, of which the reader would read the first ones.
+    int id = 0, dimensions[2];
+    nc_redef(file);
+    nc_inq_varid(file, "other", &id);
+    nc_inq_vardimid(file, id, dimensions);
+    nc_def_dim(file, "more", 100, &dimensions[1]);
+    nc_def_var(file, "vals_nod_var2", NC_DOUBLE, 2, dimensions, &id);
+  });
+  EXPECT_THAT(refusal(path, "v_", Take::gradient), left_out("left out: \"v_y\""));
+  write_bar(path, 2);
+  change(path, [](int file) {  // As meshio writes it: the form of coordinates is one, that of variables another.
+    int id = 0, dimensions[2];
+    nc_redef(file);
+    nc_del_att(file, NC_GLOBAL, "file_size");
+    nc_inq_dimid(file, "num_dim", &dimensions[0]);
+    nc_inq_dimid(file, "num_nodes", &dimensions[1]);
+    nc_def_var(file, "coord", NC_DOUBLE, 2, dimensions, &id);
+    nc_enddef(file);
+    std::vector<double> x;
+    for (const auto axis : {0, 1, 2})
+      for (int i = 0; i < 12; ++i) x.push_back(axis == 0 ? i / 4 : axis == 1 ? i % 2 : i % 4 / 2);
+    nc_put_var_double(file, id, x.data());
+  });
+  EXPECT_THAT(refusal(path, "v_", Take::gradient), left_out("meshio convert a.e FILE.vtu"));
+}
+
+TEST(Exodus, PiecesOfNemesisAreOneMesh) {
+  const TemporaryFolder folder;
+  const Path first = folder / "out.e.2.0", second = folder / "out.e.2.1";
+  for (const int mode : modes) {
+    write_bar(first, 3, mode, 0, 2);
+    write_bar(second, 3, mode, 2, 3);
+    for (const std::vector<Path>& files : {std::vector{first}, {second}, {first, second}, {second, first}}) {
+      const Imported all = import(files, "v_", Take::gradient);
+      EXPECT_EQ(all.cells, 5u);
+      EXPECT_EQ(all.voxels, 11u * 3 * 3);
+      EXPECT_NEAR(all.tensor(2, 2), 9, 1e-5);
+      EXPECT_THAT(all.notes, HasSubstr("one of 2 pieces of a mesh (Nemesis): all are read"));
+    }
+    EXPECT_EQ(read_vtk_source(first)->GetNumberOfPoints(), 24);  // Those between both are the same.
+  }
+  write_bar(second, 2, EX_LARGE_MODEL, 2, 3);
+  EXPECT_THAT(expect_step(first, 2), HasSubstr("step 2 of 3 is taken"));
+  std::filesystem::remove(second);
+  EXPECT_THAT(error_of([&] { import({first}, "v_", Take::gradient); }),
+              HasSubstr("of which are missing: out.e.2.1; copy"));
+  write_bar(folder / "out.e.12.07", 1);
+  EXPECT_THAT(error_of([&] { import({folder / "out.e.12.07"}, "v_", Take::gradient); }),
+              HasSubstr("of which are missing: out.e.12.00 out.e.12.01"));
+  write_bar(folder / "run.2.5.e", 1);  // No piece.
+  EXPECT_EQ(import({folder / "run.2.5.e"}, "v_", Take::gradient).cells, 2u);
+}
+
+}  // namespace
+}  // namespace tensorray

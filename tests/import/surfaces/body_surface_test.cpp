@@ -1,0 +1,302 @@
+// The surface of the body that a mesh is, of all types of cells.
+
+#include "tools/import/surfaces/body_surface.h"
+
+#include <set>
+
+#include <gtest/gtest.h>
+#include <vtkCellData.h>
+#include <vtkImageData.h>
+#include <vtkRectilinearGrid.h>
+
+#include "base/process/progress.h"
+#include "tests/import/cell_types.h"
+#include "tests/import/mesh_files.h"
+#include "tests/import/mesh_fixtures.h"
+#include "tests/import/vtk_files.h"
+#include "tools/import/import_file.h"
+#include "tools/import/meshes/flat_mesh.h"
+#include "tools/import/surfaces/triangle_shells.h"
+#include "tools/import/vtk/vtk_data_sets.h"
+
+namespace tensorray {
+namespace {
+
+using namespace mesh_fixtures;
+
+Vector3d as_it_is(const Vector3d& p) { return p; }
+
+/// The unit cube to the unit ball.
+Vector3d to_ball(const Vector3d& p) {
+  const Vector3d q = 2 * p.array() - 1;
+  const double norm = q.norm();
+  return norm > 0 ? Vector3d(q * (q.cwiseAbs().maxCoeff() / norm)) : q;
+}
+
+/// To a plate of thickness 1 and radius 2 with a hole of radius 1.
+Vector3d to_plate(const Vector3d& p) {
+  const double angle = p.x() == 1 ? 0 : 2 * pi * p.x();
+  return {(1 + p.y()) * std::cos(angle), (1 + p.y()) * std::sin(angle), p.z()};
+}
+
+/// The corners, in a cube, of the cells of a kind that fill it.
+std::vector<std::vector<std::size_t>> cells_in_cube(int type) {
+  switch (static_cast<int>(std::lround(24 * parametric_volume({type})))) {
+    case 4:  // 1/6
+      if (type == VTK_TRIQUADRATIC_PYRAMID) break;
+      return {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
+    case 12:
+      return {{0, 1, 3, 4}, {2, 3, 1, 6}};
+    case 24:
+      return {{0, 1, 3, 4}};
+    default:
+      break;
+  }
+  return {{0, 1, 3, 8}, {7, 6, 4, 8}, {0, 4, 1, 8}, {1, 5, 2, 8}, {2, 6, 3, 8}, {3, 7, 0, 8}};  // Pyramids.
+}
+
+/// The unit cube, divided into n³ cubes of cells of a kind, moved by `map`.
+Grid divided(const CellKind& kind, int n, const Map& map) {
+  auto grid = Grid::New();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  grid->SetPoints(points);
+  const std::vector<Vector3d> at = parametric_points(kind);
+  std::vector<Vector3d> corners = cube_corners();
+  corners.emplace_back(0.5, 0.5, 0.5);
+  const auto frame = [](const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
+    return (Matrix3d() << b - a, c - a, d - a).finished();
+  };
+  for (int cube = 0; cube < n * n * n; ++cube)
+    for (const std::vector<std::size_t>& cell : cells_in_cube(kind.type)) {
+      const bool is_simplex =
+          cell.size() == 4 && parametric_volume(kind) < 0.6 && at.size() != 5 && at.size() != 13 && at.size() != 19;
+      const std::size_t third = is_simplex ? 2 : kind.type == VTK_VOXEL ? 2 : 3, fourth = is_simplex ? 3 : 4;
+      const Matrix3d to_cube = frame(corners[cell[0]], corners[cell[1]], corners[cell[2]], corners[cell[3]]) *
+                               frame(at[0], at[1], at[third], at[fourth]).inverse();
+      vtkNew<vtkIdList> ids;
+      for (const Vector3d& p : at) {
+        const Vector3d in_cube =
+            corners[cell[0]] + to_cube * (p - at[0]) + Vector3d(cube % n, cube / n % n, cube / n / n);
+        const Vector3d rounded = (in_cube / n * 5040e6).array().round() / 5040e6;  // Neighbours have the same points.
+        ids->InsertNextId(points->InsertNextPoint(map(rounded).data()));
+      }
+      grid->InsertNextCell(kind.type, ids);
+    }
+  return grid;
+}
+
+/// V − E + F: 2 for each ball, 0 for each ring.
+int euler_characteristic(const TriangleMesh& mesh) {
+  std::set<std::uint32_t> vertices;
+  for (const auto& triangle : mesh.triangles) vertices.insert(triangle.begin(), triangle.end());
+  return static_cast<int>(vertices.size()) - static_cast<int>(mesh.triangles.size()) / 2;
+}
+
+struct Body {
+  const char* name;
+  Map map;
+  double volume, area;
+  int euler;
+};
+
+std::vector<Body> bodies() {
+  return {{"box", as_it_is, 1, 6, 2},
+          {"ball", to_ball, 4 * pi / 3, 4 * pi, 2},
+          {"plate", to_plate, 3 * pi, 6 * pi + 6 * pi, 0}};
+}
+
+/// The order of the polynomials of a kind's faces.
+int order_of(const CellKind& kind) {
+  if (is_higher_order(kind.type)) return kind.order;
+  if (kind.type == VTK_QUADRATIC_LINEAR_WEDGE) return 1;
+  return points_of(kind) > 8 && kind.type != VTK_PENTAGONAL_PRISM && kind.type != VTK_HEXAGONAL_PRISM ? 2 : 1;
+}
+
+class BodySurfaceOf : public ::testing::TestWithParam<CellKind> {};
+
+TEST_P(BodySurfaceOf, OneCellIsItsOwn) {
+  Eigen::Affine3d map;
+  map.linear() << 1.1, 0.2, -0.1, 0.1, 0.9, 0.25, -0.3, 0.15, 1.3;
+  map.translation() << 3, -2, 5;
+  const BodySurface surface = body_surface(*one_cell(GetParam(), map), 1e-3);
+  EXPECT_EQ(surface.open_edges, 0u);
+  EXPECT_EQ(euler_characteristic(surface.mesh), 2);
+  EXPECT_NEAR(surface.mesh.volume(), parametric_volume(GetParam()) * map.linear().determinant(), 1e-9);
+}
+
+TEST_P(BodySurfaceOf, BodiesHaveTheirVolumeAndArea) {
+  const int type = GetParam().type;
+  if (type == VTK_PENTAGONAL_PRISM || type == VTK_HEXAGONAL_PRISM || type == VTK_CONVEX_POINT_SET ||
+      type == VTK_POLYHEDRON)
+    GTEST_SKIP() << "fill no cubes";
+  const bool is_bezier = type >= VTK_BEZIER_CURVE && type <= VTK_BEZIER_PYRAMID;
+  for (const Body& body : bodies()) {
+    if (type == VTK_VOXEL && body.name != std::string("box")) continue;
+    if ((type == VTK_PYRAMID || type == VTK_QUADRATIC_PYRAMID) && body.name == std::string("plate"))
+      continue;  // They fold.
+    SCOPED_TRACE(body.name);
+    const int n = 6;
+    const BodySurface surface = body_surface(*divided(GetParam(), n, body.map), 1e-3);
+    EXPECT_EQ(surface.open_edges, 0u);
+    EXPECT_EQ(surface.inner_faces, 0u);
+    EXPECT_EQ(euler_characteristic(surface.mesh), body.euler);
+    if (is_bezier && GetParam().order > 1 && body.name != std::string("box"))
+      continue;  // Points are not on the surface.
+    const double error = body.name == std::string("box") ? 1e-9 : order_of(GetParam()) == 1 ? 0.2 : 6e-3;
+    EXPECT_NEAR(surface.mesh.volume(), body.volume, error * body.volume);
+    EXPECT_NEAR(surface.area, body.area, error * body.area);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, BodySurfaceOf, ::testing::ValuesIn(solid_cell_kinds()),
+                         [](const auto& test) { return name_of(test.param); });
+
+TEST(BodySurface, CurvedCellsAreDividedAsTheToleranceSays) {
+  const Grid ball = divided({VTK_LAGRANGE_HEXAHEDRON, 4}, 4, to_ball);
+  std::size_t triangles = 0;
+  for (const double tolerance : {1e-2, 2e-3, 5e-4}) {
+    const BodySurface surface = body_surface(*ball, tolerance);
+    for (std::size_t i = 0; i < surface.mesh.triangles.size(); ++i) {
+      Vector3d centre = Vector3d::Zero();
+      for (const std::uint32_t vertex : surface.mesh.triangles[i]) centre += surface.mesh.vertices[vertex] / 3;
+      EXPECT_NEAR(centre.norm(), 1, 2 * tolerance);  // More inside triangles than along edges.
+    }
+    EXPECT_GT(surface.mesh.triangles.size(), 2 * triangles);
+    triangles = surface.mesh.triangles.size();
+  }
+}
+
+/// Cells of a grid that `is_used` chooses by their number, with its points.
+Grid some_cells(vtkDataSet& mesh, const std::function<bool(vtkIdType)>& is_used) {
+  auto grid = Grid::New();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (vtkIdType i = 0; i < mesh.GetNumberOfPoints(); ++i) points->InsertNextPoint(mesh.GetPoint(i));
+  grid->SetPoints(points);
+  vtkNew<vtkIdList> ids;
+  for (vtkIdType i = 0; i < mesh.GetNumberOfCells(); ++i) {
+    if (!is_used(i)) continue;
+    mesh.GetCellPoints(i, ids);
+    grid->InsertNextCell(mesh.GetCellType(i), ids);
+  }
+  return grid;
+}
+
+TEST(BodySurface, InnerFacesAreCountedAndThoseWithOtherDiagonalsAreGone) {
+  const auto beside = [](const Vector3d& p) { return Vector3d(1 + p.x(), 1 - p.y(), p.z()); };
+  const CellKind hexes{VTK_HEXAHEDRON}, tetras{VTK_TETRA}, curved{VTK_QUADRATIC_TETRA};
+  struct Case {
+    Grid first, second;
+    std::size_t inner, triangles;
+  };
+  for (const Case& c : {Case{divided(hexes, 2, as_it_is), divided(hexes, 2, beside), 0, 80},
+                        Case{divided(tetras, 2, as_it_is), divided(tetras, 2, beside), 16, 80},
+                        Case{divided(curved, 2, as_it_is), divided(curved, 2, beside), 16, 80},
+                        Case{divided(hexes, 2, as_it_is), divided(tetras, 2, beside), 12, 80},
+                        Case{divided(curved, 2, as_it_is), divided(hexes, 2, beside), 12, 80},
+                        Case{divided(hexes, 2, as_it_is), divided(hexes, 3, beside), 4 + 9, 48 + 108}}) {
+    const auto mesh = one_data_set({c.first, c.second});
+    const BodySurface surface = body_surface(*mesh, 0.01);
+    EXPECT_EQ(surface.inner_faces, c.inner);
+    EXPECT_EQ(surface.mesh.triangles.size(), c.triangles);
+    EXPECT_EQ(surface.open_edges, 0u);
+    EXPECT_NEAR(surface.mesh.volume(), 2, 1e-12);
+    EXPECT_NEAR(surface.area, 10, 1e-12);
+  }
+}
+
+TEST(BodySurface, CellsOfAnySenseLookOutwards) {
+  const Grid box = divided({VTK_HEXAHEDRON}, 3, as_it_is);
+  vtkNew<vtkIdList> ids;
+  for (vtkIdType cell = 0; cell < 27; cell += 2) {
+    box->GetCellPoints(cell, ids);
+    const vtkIdType mirrored[] = {ids->GetId(4), ids->GetId(5), ids->GetId(6), ids->GetId(7),
+                                  ids->GetId(0), ids->GetId(1), ids->GetId(2), ids->GetId(3)};
+    box->GetCells()->ReplaceCellAtId(cell, 8, mirrored);
+  }
+  const BodySurface surface = body_surface(*box, 0.01);
+  EXPECT_EQ(surface.open_edges, 0u);
+  EXPECT_NEAR(surface.mesh.volume(), 1, 1e-12);
+}
+
+TEST(BodySurface, TheBodyEndsWhereTheDataEnd) {
+  struct Case {
+    const char* name;
+    std::function<void(vtkStructuredGrid&, vtkDoubleArray&, vtkDoubleArray&)> spoil;  // Tensors at points, cells.
+    int missing, euler;
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Case& c : {Case{"all", [](auto&, auto&, auto&) {}, 0, 2},
+                        Case{"corner", [&](auto&, auto&points, auto&) { points.SetComponent(0, 3, nan); }, 1, 2},
+                        Case{"node", [&](auto&, auto&points, auto&) { points.SetComponent(43, 3, nan); }, 8, 2},
+                        Case{"cell", [&](auto&, auto&, auto&cells) { cells.SetComponent(31, 8, nan); }, 1, 4},
+                        Case{"blanked", [](auto&mesh, auto&, auto&) { mesh.BlankCell(31); }, 1, 4},
+                        Case{"hidden", [](auto&mesh, auto&, auto&) { mesh.BlankPoint(43); }, 8, 2}}) {
+    SCOPED_TRACE(c.name);
+    const auto mesh = curvilinear({6, 6, 6}, as_it_is);
+    add_array<9>(*mesh, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
+    vtkNew<vtkDoubleArray> of_cells;
+    of_cells->SetName(tensor_array);
+    of_cells->SetNumberOfComponents(9);
+    of_cells->SetNumberOfTuples(mesh->GetNumberOfCells());
+    of_cells->Fill(1);
+    mesh->GetCellData()->AddArray(of_cells);
+    c.spoil(*mesh, *vtkDoubleArray::SafeDownCast(mesh->GetPointData()->GetArray(tensor_array)), *of_cells);
+    const BodySurface surface = body_surface(*mesh, 0.01);
+    EXPECT_NEAR(surface.mesh.volume(), 1 - c.missing / 125.0, 1e-12);
+    EXPECT_EQ(euler_characteristic(surface.mesh), c.euler);
+    EXPECT_EQ(surface.open_edges, 0u);
+  }
+}
+
+TEST(BodySurface, SlabsHaveTopBottomAndWallsAlsoInHoles) {
+  const auto plane = curvilinear({5, 5, 1}, [](const Vector3d& p) { return Vector3d(4 * p.x(), 4 * p.y(), 7); });
+  const Grid ring = some_cells(*plane, [](vtkIdType i) { return i != 5 && i != 6 && i != 9 && i != 10; });
+  const BodySurface surface = body_surface(*slab_of(*ring, *flat_mesh(*ring), 0.5), 0.01);
+  EXPECT_EQ(surface.open_edges, 0u);
+  EXPECT_EQ(euler_characteristic(surface.mesh), 0);
+  EXPECT_NEAR(surface.mesh.volume(), 6, 1e-12);
+  EXPECT_NEAR(surface.area, 24 + 0.5 * (16 + 8), 1e-12);
+  EXPECT_TRUE(surface.mesh.bounds().isApprox(Eigen::AlignedBox3d(Vector3d(0, 0, 6.75), Vector3d(4, 4, 7.25))));
+}
+
+TEST(BodySurface, ABoxCutsIt) {
+  const BodySurface ball = body_surface(*divided({VTK_QUADRATIC_HEXAHEDRON}, 6, to_ball), 1e-3);
+  const TriangleMesh half = cut_to(ball.mesh, {Vector3d(0, -2, -2), Vector3d(2, 2, 2)});
+  EXPECT_EQ(open_edges(half), 0u);
+  EXPECT_NEAR(half.volume(), ball.mesh.volume() / 2, 1e-9);
+  const TriangleMesh cap = cut_to(ball.mesh, {Vector3d(0.5, -2, -2), Vector3d(2, 2, 2)});
+  EXPECT_EQ(open_edges(cap), 0u);
+  EXPECT_NEAR(cap.volume(), pi * 0.25 * 2.5 / 3, 3e-3);
+}
+
+TEST(BodySurface, ImportGivesItToGridsOfMeshes) {
+  const TemporaryFolder folder;
+  const auto import = [&](vtkDataSet& mesh, ImportSettings settings) {
+    write_xml(mesh, folder / "a.vtk");
+    std::filesystem::rename(folder / "a.vtk", folder / settings.files[0]);
+    settings.files = {folder / settings.files[0]};
+    ImportReport report;
+    return import_tensors(settings, Progress(), report).surface;
+  };
+  ImportSettings settings;
+  settings.files = {"a.vtu"};
+  EXPECT_NEAR(import(*bar(0, 3), settings).volume(), 3, 1e-12);
+  settings.sampling.bounds = Eigen::AlignedBox3d(Vector3d(1.5, 0, 0), Vector3d(9, 9, 0.5));
+  EXPECT_NEAR(import(*bar(0, 3), settings).volume(), 0.75, 1e-12);
+  settings.surface = false;
+  EXPECT_TRUE(import(*bar(0, 3), settings).triangles.empty());
+  settings = {};
+  settings.files = {"a.vtr"};
+  EXPECT_NEAR(import(*rectilinear(), settings).volume(), 4 * 1.5 * 8, 1e-12);
+  settings.files = {"a.vts"};
+  EXPECT_NEAR(import(*structured(), settings).volume(), 6 * 0.98, 1e-12);
+  settings.files = {"a.vti"};
+  EXPECT_TRUE(import(*image(), settings).triangles.empty());
+  settings.sampling.resolution = 9;
+  EXPECT_TRUE(import(*image(), settings).triangles.empty());
+}
+
+}  // namespace
+}  // namespace tensorray

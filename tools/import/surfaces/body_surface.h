@@ -1,0 +1,31 @@
+#pragma once
+/// @file tools/import/surfaces/body_surface.h
+/// The surface of the body that a mesh is.
+
+#include <cstddef>
+
+#include "base/geometry/triangle_mesh.h"
+
+class vtkDataSet;
+
+namespace tensorray {
+
+struct BodySurface {
+  /// Closed: each edge of a triangle has its opposite in another one. Oriented outwards. A point is in the body where a
+  /// ray from it leaves the surface more often than it enters: where meshes do not match, shells touch or overlap.
+  TriangleMesh mesh;
+  /// Faces with other cells on their other side: those that have been removed, as only their diagonals differ
+  /// (mesh_faces.h), and those that are left.
+  std::size_t inner_faces = 0;
+  double area = 0;             ///< Without inner faces; 0: not known.
+  std::size_t open_edges = 0;  ///< Of polyhedra whose faces do not close.
+};
+
+/// The outside of all three-dimensional cells that carry data, with its holes: those that MeshCell loads, whose tensors
+/// (with_tensors; if there are any) are finite at the cell and at all its points. Triangles are so small that their
+/// edges are no farther than about `tolerance` (> 0) from faces that are curved or whose corners are in no plane. Faces
+/// that have an edge in common have the same vertices there. Uses all threads; the result does not depend on their
+/// number.
+BodySurface body_surface(vtkDataSet& mesh, double tolerance);
+
+}  // namespace tensorray
