@@ -132,11 +132,12 @@ struct Geometry::State {
     });
   }
 
-  /// Whether light is inside the cut just beyond some of its crossings, those from `first` to before `last`, which
-  /// count as one.
+  /// Whether light is inside the cut beyond some of its crossings, those from `first` to before `last`, which count as
+  /// one.
   /// @param crossings  All of the light.
   bool is_inside_beyond(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, const Crossings& crossings,
                         std::size_t first, std::size_t last) const {
+    if (last == crossings.size()) return false;  // It would not leave.
     int count = 0, inside = 0;
     bool is_clear = true;
     for (std::size_t i = crossings.size(); i-- > first;) {
@@ -145,11 +146,8 @@ struct Geometry::State {
       is_clear = is_clear && crossings[i].is_clear && count >= 0;
     }
     if (is_clear) return inside > 0;
-    Eigen::Vector3d past = Eigen::Vector3d::Zero();
-    for (std::size_t i = first; i < last; ++i)
-      past += crossings[i].sign * exact(cut, from, direction, crossings[i]).normal;
     const double at = last > first ? crossings[last - 1].distance : 0;
-    return is_inside(from + at * direction + margin * (3 * direction + 2 * past.normalized()));
+    return is_inside(from + (at + crossings[last].distance) / 2 * direction);  // Farthest from what is crossed.
   }
 
   /// Whether the cut surrounds a point. On the skin it does not: there is nothing on one of its sides.

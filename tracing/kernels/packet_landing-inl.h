@@ -86,7 +86,8 @@ static HWY_NOINLINE void move_to_faces(const PacketMedium& medium, Packet& packe
     const F3 to = load(packet.next.p, i), u = load(packet.next.u, i);
     const F gap = way_to_plane(medium, packet, landing, to, i);
     const F way = hn::Div(gap, across_plane(landing, u, i));
-    const F rest = hn::IfThenElseZero(hn::Le(hn::Abs(way), load(landing.longest, i)), way);
+    F rest = hn::IfThenElseZero(hn::Le(hn::Abs(way), load(landing.longest, i)), way);
+    if (landing.on_surfaces) rest = hn::Max(rest, hn::Neg(load(packet.time, i)));  // Not back behind the step.
     store(mul_add(rest, u, to), packet.next.p, i);
     store(hn::Add(load(packet.time, i), rest), packet.time, i);
   }

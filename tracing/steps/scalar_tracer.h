@@ -33,6 +33,7 @@ struct Travelled {
   double length = 0;  // Length of the path so far, world units.
   Eigen::RowVector2d length_change = Eigen::RowVector2d::Zero();
   std::uint32_t steps = 0;
+  int grazes = 0;  // How often it has left the cut after hardly any way.
 };
 
 /// Traces one ray, alone (N = 1) or with its derivatives along two parameters (N = 3). The volume is the field's
@@ -61,6 +62,7 @@ class Tracer {
     length_ = 0;
     length_change_.setZero();
     steps_ = 0;
+    grazes_ = 0;
     if (direction().isZero() || !position().allFinite()) return RayEnd::degenerate;
     if (!field_.contains(position()))
       if (const auto end = reach_box()) return end;
@@ -79,6 +81,7 @@ class Tracer {
     length_ = travelled.length;
     length_change_ = travelled.length_change;
     steps_ = travelled.steps;
+    grazes_ = travelled.grazes;
   }
 
   /// Follows the ray from a point in the field to its end, or to where it has left the cut and enters it again; then
@@ -93,15 +96,19 @@ class Tracer {
 
   /// Follows the ray from the cut, through free space, to its end or to where it enters the cut again; then returns
   /// nothing. A ray that grazes the cut might enter and leave it at one point for ever, as chords do not go quite the
-  /// way of light: it is moved on, a little more after each step. @param way  Its length since it entered the cut.
+  /// way of light: it is moved on, each time twice as far, and so out of the volume after twenty times.
+  /// @param way  Its length since it entered the cut.
   std::optional<RayEnd> leave_cut(double way) {
     ++steps_;
     Hit ahead;
-    ahead.distance = geometry_.margin() * (1 + steps_ / 8.0);
-    if (way <= ahead.distance) {
+    ahead.distance = std::ldexp(geometry_.margin() * (1 + steps_ / 8.0), grazes_);
+    const bool grazes = way <= ahead.distance;
+    if (grazes) {
+      ++grazes_;
       if (const auto end = reach(ahead)) return end;
     }
-    const auto end = cross_box();
+    const bool is_inside = grazes && field_.contains(position()) && geometry_.inside_cut(position(), direction());
+    const auto end = is_inside ? std::nullopt : cross_box();
     if (!end) ++steps_;
     return end;
   }
@@ -126,7 +133,7 @@ class Tracer {
   }
 
   const State<N>& state() const { return ray_; }
-  Travelled travelled() const { return {length_, length_change_, steps_}; }
+  Travelled travelled() const { return {length_, length_change_, steps_, grazes_}; }
   std::uint64_t samples() const { return sampler_.samples(); }
 
  private:
@@ -321,9 +328,9 @@ class Tracer {
     State<N> unused, landed = ray_;
     for (int i = 0; i < 4; ++i) {
       landed = step(length, unused);
-      const double gap =
-          (landing.to_plane - hit.normal.dot(landed.position() - start)) / hit.normal.dot(landed.direction());
-      if (!(std::abs(gap) <= h)) break;  // The light is nearly parallel to the plane.
+      double gap = (landing.to_plane - hit.normal.dot(landed.position() - start)) / hit.normal.dot(landed.direction());
+      if (hit.surface == Surface::cut) gap = std::max(gap, -length);  // Not back, to cross it there again.
+      if (!(std::abs(gap) <= h)) break;                               // The light is nearly parallel to the plane.
       if (std::abs(gap) <= (is_composed() ? composed_landing : other_landing) * h || i == 3) {
         landed.P += gap * landed.V;
         length += gap;
@@ -417,6 +424,7 @@ class Tracer {
   double voxel_ = 0;                  // Length of a voxel along the ray, world units.
   double adaptive_step_ = 0;          // The next step by the error control, in voxels.
   std::uint32_t steps_ = 0;
+  int grazes_ = 0;
 };
 
 /// σ = s · scale of ray i of a batch. Only this function uses the field's scale.

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/tracing/support.h"
+#include "tracing/steps/scalar_tracer.h"
 
 // Rays through closed meshes of all kinds, as the cut of a volume. Light is straight but for rounding (σ T ~ 1e-9), so
 // that its way within a body of convex parts is known: that of their union.
@@ -133,7 +134,7 @@ std::vector<CutCase> cut_cases() {
   return {
       {"a box", {box_part(-half, half)}},
       {"a box that fills the volume", {box_part(-one, one)}},
-      {"a box beyond the volume", {box_part(-2 * one, 1.5 * one)}},
+      {"a box beyond the volume", {box_part(-2 * one, 1.1 * one)}},
       {"a layer of the volume", {box_part({-1, -1, -0.125}, {1, 1, 0.125})}},
       {"a ball", {ball_part({0, 0, 0}, 0.75)}},
       {"a box twice", {box_part(-half, half), box_part(-half, half)}},
@@ -151,6 +152,7 @@ std::vector<CutCase> cut_cases() {
 }
 
 enum class LineKind { random, through_vertices, in_faces, grazing };
+constexpr LineKind line_kinds[] = {LineKind::random, LineKind::through_vertices, LineKind::in_faces, LineKind::grazing};
 
 /// A line through the volume, from outside.
 std::pair<Vector3d, Vector3d> a_line(LineKind kind, std::mt19937& random) {
@@ -197,6 +199,13 @@ class CutTest : public testing::TestWithParam<CutCase> {
     return Geometry(std::move(surfaces));
   }
 
+  /// A ray may graze twenty times, in four steps each.
+  static BendingSettings few_steps() {
+    BendingSettings settings;
+    settings.max_steps = 100;
+    return settings;
+  }
+
   static RayBatch lines(LineKind kind, double flexibility) {
     RayBatch batch;
     std::mt19937 random(7);
@@ -206,59 +215,67 @@ class CutTest : public testing::TestWithParam<CutCase> {
     }
     return batch;
   }
+
+  /// By how much the turns of rays differ that pass the body up to 0.04 voxels beside a ray, by the reference.
+  static double spread(const Geometry& geometry, const RayBatch& start, std::size_t ray) {
+    RayBatch around;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double beside : {-0.04, -1e-4, 0.0, 1e-4, 0.04}) {
+        const Vector3d tilt = beside * 0.125 / 4 * Vector3d::Unit(axis);  // Rays start at 4 from the body.
+        around.add(start.position[ray], (start.direction[ray] + tilt).normalized(), start.flexibility[ray]);
+      }
+    RayBatch ends = around;
+    trace_reference(field(), geometry, {}, ends);
+    Eigen::AlignedBox3d turns;
+    for (std::size_t i = 0; i < ends.size(); ++i) turns.extend(ends.direction[i] - around.direction[i]);
+    return turns.diagonal().norm();
+  }
 };
 
 /// No ray stays at a surface, and straight light is in the body as far as the union of its parts reaches. What is
-/// within the margin of surfaces may count as either. Of lines in faces and through vertices, single precision may lose
-/// a few at another face's edge.
+/// within the margin of surfaces may count as either.
 TEST_P(CutTest, LightIsInTheBodyAsFarAsItReaches) {
   const Geometry geometry = this->geometry();
   const double near = 4 * geometry.margin();
-  for (const LineKind kind : {LineKind::random, LineKind::through_vertices, LineKind::in_faces, LineKind::grazing}) {
+  for (const LineKind kind : line_kinds) {
     const RayBatch start = lines(kind, 1e-9);
     RayBatch batch = start;
     std::vector<RayRecord> records;
-    trace(field(), geometry, {}, batch, &records);
-    int wrong = 0;
+    trace(field(), geometry, few_steps(), batch, &records);
     for (std::size_t i = 0; i < batch.size(); ++i) {
-      ASSERT_EQ(batch.end[i], RayEnd::missed) << i;
+      SCOPED_TRACE("kind " + std::to_string(int(kind)) + ", ray " + std::to_string(i));
+      ASSERT_EQ(batch.end[i], RayEnd::missed);
       const auto expected = [&](double more) {
         return length_within(GetParam().parts, start.position[i], start.direction[i], more);
       };
       const double length = bent_length(points_of(field(), records[i]));
-      const double least = expected(-near) - 10 * near, most = expected(near) + 10 * near;
-      if (length >= least && length <= most) continue;
-      if (++wrong > per_kind / 200 || kind == LineKind::random)
-        ADD_FAILURE() << "kind " << int(kind) << ", ray " << i << " from " << start.position[i].transpose() << " along "
-                      << start.direction[i].transpose() << ": " << length << " is not in [" << least << ", " << most
-                      << "]";
+      EXPECT_GE(length, expected(-near) - 10 * near);
+      EXPECT_LE(length, expected(near) + 10 * near);
     }
-    EXPECT_LE(wrong, kind == LineKind::random ? 0 : per_kind / 200) << int(kind);
   }
 }
 
 /// The same rays bend in packets as one by one, alone or with differentials, within the part of a step that lands
-/// straight. Of those that pass an edge nearer than chords follow the path, or graze, rounding decides.
+/// straight. Both find surfaces within 0.02 voxels of the path: rays to which this matters, as they graze or pass an
+/// edge, differ no more than those beside them.
 TEST_P(CutTest, PacketsAgreeWithTheReference) {
   const Geometry geometry = this->geometry();
-  for (const LineKind kind : {LineKind::random, LineKind::through_vertices, LineKind::in_faces, LineKind::grazing}) {
-    RayBatch packets = lines(kind, 0.3), reference = packets, with_differentials = packets;
-    with_differentials.differentials.resize(packets.size());
-    trace(field(), geometry, {}, packets);
-    trace_reference(field(), geometry, {}, reference);
-    trace(field(), geometry, {}, with_differentials);
-    int differ = 0, stay = 0;
-    for (std::size_t i = 0; i < packets.size(); ++i) {
-      stay += packets.end[i] != RayEnd::missed;
-      stay += reference.end[i] != RayEnd::missed;
-      stay += with_differentials.end[i] != RayEnd::missed;
-      differ += (packets.direction[i] - reference.direction[i]).norm() > 4e-4;
-      differ += (with_differentials.direction[i] - reference.direction[i]).norm() > 4e-4;
-    }
-    // Known defect: where the body fills the volume, 8 of these 3000 rays at less than 1e-6 to a face end by the limit
-    // of steps.
-    EXPECT_LE(stay, kind == LineKind::grazing ? 8 : 0) << int(kind);
-    EXPECT_LE(differ, per_kind / (kind == LineKind::random ? 100 : 20)) << int(kind);
+  const double flexibility = 0.3, longest_step = 0.125 * step_lengths::longest_composed;
+  const double near = composed_landing * flexibility * deviator_norm(general_tensor()) * longest_step;
+  for (const LineKind kind : line_kinds) {
+    const RayBatch start = lines(kind, flexibility);
+    RayBatch packets = start, reference = start, with_differentials = start;
+    with_differentials.differentials.resize(start.size());
+    trace(field(), geometry, few_steps(), packets);
+    trace_reference(field(), geometry, few_steps(), reference);
+    trace(field(), geometry, few_steps(), with_differentials);
+    for (std::size_t i = 0; i < start.size(); ++i)
+      for (const RayBatch* const batch : {&packets, &reference, &with_differentials}) {
+        EXPECT_EQ(batch->end[i], RayEnd::missed) << "kind " << int(kind) << ", ray " << i;
+        const double differs = (batch->direction[i] - reference.direction[i]).norm();
+        if (differs <= near) continue;
+        EXPECT_LE(differs, spread(geometry, start, i)) << "kind " << int(kind) << ", ray " << i;
+      }
   }
 }
 
