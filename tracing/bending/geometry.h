@@ -66,8 +66,8 @@ class Geometry {
 
   /// Where light first crosses the bounds or the cut in the given sense (inwards or outwards). Crossings in the other
   /// sense are skipped. A mesh may consist of closed shells that touch or overlap: of the cut, only what separates
-  /// inside from outside is crossed. Inside is where the cut surrounds a point more often than not at all, counted just
-  /// beyond all that the light meets within `margin`.
+  /// inside from outside is crossed. Inside is where the cut surrounds a point more often than not at all; surfaces
+  /// that light meets within `margin` of each other count as one.
   std::optional<Hit> crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                               const Eigen::Vector3d& direction, double max_distance = infinite) const;
 

@@ -102,14 +102,6 @@ bool is_clear(const Geometry& geometry, const Eigen::Vector3d& from, const Eigen
   return rest < 0 || rest < geometry.clearance(to);
 }
 
-/// Whether a surface is met in the extent. A cut that ends where the extent ends is left with the extent.
-bool is_within(const TensorField& field, const SurfaceLanding& landing) {
-  const double near = landing.hit.surface == Surface::cut ? 1e-4 : 0;  // Voxels.
-  const Eigen::Array3d at = field.to_index() * landing.point;
-  return (at >= field.index_bounds().min().array() + near).all() &&
-         (at <= field.index_bounds().max().array() - near).all();
-}
-
 }  // namespace
 
 bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane, bool leaves,
@@ -138,7 +130,8 @@ bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int la
       landing.to_plane = static_cast<float>(hit->normal.dot(landing.point - first));
       // A step that lands at its beginning is not none.
       landing.part = std::max(1e-30f, static_cast<float>((i - 1 + hit->distance / length) / count));
-      return !leaves || is_within(medium.field, landing);
+      if (leaves && !medium.field.contains(landing.point)) landing.part = 0;  // Behind the face of the extent.
+      return landing.part > 0;
     }
     begin = end;
   }
