@@ -14,7 +14,7 @@
 namespace tensorray {
 namespace {
 
-constexpr std::size_t stretch_round = 256;  // Rows, or columns of blocks, that are made before others get them.
+constexpr std::size_t stretch_round = 64;  // Rows, or columns of blocks, that are made before others get them.
 
 /// ln of the greatest singular value.
 double log_stretch(const Eigen::Matrix<double, 3, 2>& m) {
