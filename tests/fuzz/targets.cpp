@@ -27,10 +27,10 @@
 #include "scenes/source/overrides.h"
 #include "tests/fuzz/view_targets.h"
 #include "tools/import/cases/ensight.h"
+#include "tools/import/cases/exodus.h"
 #include "tools/import/hdf5/xdmf_document.h"
 #include "tools/import/lattice_files/lattice_files.h"
 #include "tools/import/vtk/vtk_messages.h"
-#include "tools/import/vtk_formats/netcdf_end.h"
 #include "volumes/vdb/vdb_tree_check.h"
 
 namespace tensorray::test {

@@ -23,7 +23,6 @@
 #include "tools/import/cases/exodus.h"
 #include "tools/import/cases/plot3d.h"
 #include "tools/import/lattice_files/lattice_files.h"
-#include "tools/import/lattices/fill_values.h"
 #include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/flat_mesh.h"
 #include "tools/import/meshes/mesh_tensors.h"

@@ -1,6 +1,7 @@
 #include "tools/import/cases/exodus.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -8,6 +9,7 @@
 #include <regex>
 #include <set>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -21,8 +23,6 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
-#include "tools/import/vtk_formats/array_names.h"
-#include "tools/import/vtk_formats/netcdf_end.h"
 
 namespace tensorray {
 namespace {
@@ -41,14 +41,46 @@ struct VariablePart {
   std::string name;
 };
 
+using Kind = vtkExodusIIReader::ObjectType;
+
 /// A file, which may be one of several pieces.
 struct Piece {
   Path path;
   std::shared_ptr<const int> file;  ///< Of the library of ExodusII, and of netCDF's.
-  vtkSmartPointer<vtkExodusIIReader> reader;
-  std::vector<VariablePart> parts;  ///< That are in the file.
+  vtkSmartPointer<vtkExodusIIReader> reader = vtkSmartPointer<vtkExodusIIReader>::New();
+  std::vector<std::pair<Kind, std::vector<std::string>>> variables;  ///< That it announces, in its order.
+  std::vector<VariablePart> parts;                                   ///< That are in the file.
   std::set<std::string> missing;
 };
+
+std::vector<std::string> variables_of(int file, ex_entity_type kind) {
+  constexpr int longest = 256;
+  ex_set_max_name_length(file, longest);
+  int count = 0;
+  if (ex_get_variable_param(file, kind, &count) < 0) return {};
+  std::vector<std::string> names;
+  for (int i = 0; i < count; ++i) {
+    std::array<char, longest + 1> name{};
+    ex_get_variable_name(file, kind, i + 1, name.data());
+    names.emplace_back(name.data());
+  }
+  return names;
+}
+
+/// Calls `visit(kind, name, variables)` for each array of the reader, which joins variables that follow each other:
+/// stress_xx, stress_xy, stress_xz become a vector stress_x.
+template <class Visit>
+void for_each_array(const Piece& piece, const Visit& visit) {
+  for (const auto& [kind, names] : piece.variables) {
+    auto next = names.begin();
+    for (int i = 0; i < piece.reader->GetNumberOfObjectArrays(kind); ++i) {
+      const auto end =
+          next + std::min<std::ptrdiff_t>(names.end() - next, piece.reader->GetNumberOfObjectArrayComponents(kind, i));
+      visit(kind, piece.reader->GetObjectArrayName(kind, i), std::vector<std::string>(next, end));
+      next = end;
+    }
+  }
+}
 
 /// @param step  From 0 on. @return whether so many numbers are there.
 bool read_numbers(int file, const VariablePart& part, int step, std::vector<double>& values) {
@@ -62,12 +94,12 @@ bool is_there(int file, const VariablePart& part) {
   return read_numbers(file, part, 0, values) && !read_numbers(file, part, 0, more);
 }
 
-/// Those that a file announces.
-std::vector<VariablePart> announced_parts(int file, const ex_init_params& sizes, const Path& path) {
+std::vector<VariablePart> announced_parts(const Piece& piece, const ex_init_params& sizes) {
+  const int file = *piece.file;
   std::vector<VariablePart> all;
-  for (const std::string& name : exodus_variables(path, false))
+  for (const std::string& name : piece.variables[0].second)
     all.push_back({EX_NODAL, static_cast<int>(all.size()) + 1, 1, static_cast<std::size_t>(sizes.num_nodes), name});
-  const std::vector<std::string> names = exodus_variables(path, true);
+  const std::vector<std::string>& names = piece.variables[1].second;
   const auto blocks = static_cast<std::size_t>(sizes.num_elem_blk);
   std::vector<int> ids(blocks), table(blocks * names.size());
   ex_get_ids(file, EX_ELEM_BLOCK, ids.data());
@@ -108,18 +140,13 @@ std::string unwritten(const Piece& piece, int step) {
 
 /// Requests all variables that are there, in all blocks.
 void enable(const Piece& piece) {
-  for (const auto kind : {vtkExodusIIReader::NODAL, vtkExodusIIReader::ELEM_BLOCK}) {
-    const std::vector<std::string> names = exodus_variables(piece.path, kind == vtkExodusIIReader::ELEM_BLOCK);
-    std::size_t next = 0;  // VTK joins variables that follow each other.
-    for (int i = 0; i < piece.reader->GetNumberOfObjectArrays(kind); ++i) {
-      bool all = true;
-      for (int k = piece.reader->GetNumberOfObjectArrayComponents(kind, i); k > 0; --k, ++next)
-        all = all && (next >= names.size() || piece.missing.count(names[next]) == 0);
-      piece.reader->SetObjectArrayStatus(kind, piece.reader->GetObjectArrayName(kind, i), all ? 1 : 0);
-    }
-  }
-  for (int i = 0; i < piece.reader->GetNumberOfObjects(vtkExodusIIReader::ELEM_BLOCK); ++i)
-    piece.reader->SetObjectStatus(vtkExodusIIReader::ELEM_BLOCK, i, 1);
+  for_each_array(piece, [&](Kind kind, const char* array, const std::vector<std::string>& variables) {
+    const bool is_whole = std::none_of(variables.begin(), variables.end(),
+                                       [&](const std::string& one) { return piece.missing.count(one) > 0; });
+    piece.reader->SetObjectArrayStatus(kind, array, is_whole ? 1 : 0);
+  });
+  for (int i = 0; i < piece.reader->GetNumberOfObjects(Kind::ELEM_BLOCK); ++i)
+    piece.reader->SetObjectStatus(Kind::ELEM_BLOCK, i, 1);
 }
 
 Piece open_piece(const Path& path) {
@@ -127,25 +154,40 @@ Piece open_piece(const Path& path) {
   int word = sizeof(double), stored = 0;
   float version = 0;
   ex_init_params sizes{};
-  const int file = ex_open(path.c_str(), EX_READ, &word, &stored, &version);
-  Piece piece{path, nullptr, vtkSmartPointer<vtkExodusIIReader>::New(), {}, {}};
-  if (file >= 0)
-    piece.file = {new int(file), [](const int* id) {
-                    ex_close(*id);
-                    delete id;
-                  }};
+  Piece piece;
+  piece.path = path;
+  piece.file = {new int(ex_open(path.c_str(), EX_READ, &word, &stored, &version)), [](const int* id) {
+                  if (*id >= 0) ex_close(*id);
+                  delete id;
+                }};
+  const int file = *piece.file;
   if (file < 0 || ex_get_init_ext(file, &sizes) < 0)
     fail(path, "is damaged, or no ExodusII file but netCDF or HDF5 of another kind");
+  piece.variables = {{Kind::NODAL, variables_of(file, EX_NODAL)},
+                     {Kind::ELEM_BLOCK, variables_of(file, EX_ELEM_BLOCK)}};
   const bool has_steps = ex_inquire_int(file, EX_INQ_TIME) > 0;
-  for (const VariablePart& part : announced_parts(file, sizes, path)) {
-    const bool is_good = !has_steps || is_there(file, part);
-    is_good ? piece.parts.push_back(part) : void(piece.missing.insert(part.name));
+  for (const VariablePart& part : announced_parts(piece, sizes)) {
+    if (!has_steps || is_there(file, part))
+      piece.parts.push_back(part);
+    else
+      piece.missing.insert(part.name);
   }
   piece.reader->SetFileName(path.c_str());
   piece.reader->ApplyDisplacementsOff();
   piece.reader->UpdateInformation();
   enable(piece);
   return piece;
+}
+
+/// Names the components of joined variables as these are called in the file.
+void name_components(const Piece& piece, vtkDataSet& data) {
+  for_each_array(piece, [&](Kind kind, const char* name, const std::vector<std::string>& variables) {
+    const auto type = kind == Kind::NODAL ? vtkDataObject::POINT : vtkDataObject::CELL;
+    vtkDataArray* const array = data.GetAttributes(type)->GetArray(name);
+    const auto count = static_cast<vtkIdType>(variables.size());
+    if (!array || count < 2 || array->GetNumberOfComponents() != count) return;
+    for (vtkIdType k = 0; k < count; ++k) array->SetComponentName(k, variables[static_cast<std::size_t>(k)].c_str());
+  });
 }
 
 void hide_fill_values(vtkDataSet& block) {
@@ -169,7 +211,7 @@ vtkSmartPointer<vtkDataObject> read_piece(const Piece& piece, int step, int step
   if (own_steps > 0) piece.reader->SetTimeStep(step);
   piece.reader->Update();
   for (vtkDataSet* const block : data_sets_in(piece.reader->GetOutputDataObject(0))) {
-    name_components(*block, *piece.reader, piece.path);
+    name_components(piece, *block);
     hide_fill_values(*block);
   }
   return piece.reader->GetOutputDataObject(0);

@@ -21,4 +21,9 @@ MeshFile open_exodus(const std::filesystem::path& path);
 /// the only one.
 std::vector<std::filesystem::path> nemesis_pieces(const std::filesystem::path& path);
 
+/// Checks that a classic netCDF file ("CDF" 1, 2 or 5) is as long as its header announces: the netCDF library reads
+/// what is missing at its end as zeros. Leaves others (netCDF-4 is HDF5, which detects cut files) and damaged headers
+/// to the library. @throw std::runtime_error naming the file.
+void require_whole_netcdf(const std::filesystem::path& path);
+
 }  // namespace tensorray

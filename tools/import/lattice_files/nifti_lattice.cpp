@@ -12,7 +12,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -125,18 +124,6 @@ RawVoxels voxels_of(const nifti_image& image, const std::filesystem::path& path,
   return voxels;
 }
 
-/// Slices of matrices that are stored column by column, row by row.
-std::function<void(int, double*)> by_rows(const std::function<void(int, double*)>& read, std::int64_t pixels) {
-  return [read, pixels](int z, double* values) {
-    read(z, values);
-    for (double* matrix = values; matrix != values + 9 * pixels; matrix += 9) {
-      std::swap(matrix[1], matrix[3]);
-      std::swap(matrix[2], matrix[6]);
-      std::swap(matrix[5], matrix[7]);
-    }
-  };
-}
-
 bool has_orientation(const nifti_image& image) { return image.sform_code > 0 || image.qform_code > 0; }
 
 /// From voxel indices to RAS millimetres. Files that do not state their unit are in millimetres. Files without an
@@ -191,14 +178,14 @@ Lattice open_nifti(const std::filesystem::path& given) {
         "does not say the axes of its symmetric matrices: taken as those of the voxels, as ANTs and dipy write them; "
         "--frame says otherwise";
   RawVoxels voxels = voxels_of(*image, path, lattice);
-  if (has_matrices(*image)) {
+  voxels.by_columns = has_matrices(*image);
+  if (voxels.by_columns) {
     lattice.frame = axes_of(ComponentFrame::voxels, lattice.to_world.linear());
     lattice.frame_note =
         "does not say the axes of its 3 x 3 matrices: taken as those of the voxels, as dipy writes them; --frame says "
         "otherwise";
   }
   lattice.read_slice = slices_of(std::move(voxels), lattice.size, lattice.components);
-  if (has_matrices(*image)) lattice.read_slice = by_rows(lattice.read_slice, image->nx * image->ny);
   return lattice;
 }
 

@@ -132,13 +132,9 @@ Lattice open_npy(const std::filesystem::path& path) {
   voxels.order = header.order;
   voxels.strides = {n, n * x, n * x * y, 1};
   if (header.fortran) voxels.strides = {z * y, z, 1, z * y * x};
+  voxels.by_columns = header.fortran && header.shape.size() == 5;
   voxels.bytes = read_numbers(path, {path, header.data_start}, voxels.type, lattice.size, lattice.components);
   lattice.read_slice = slices_of(std::move(voxels), lattice.size, lattice.components);
-  if (header.fortran && header.shape.size() == 5)  // The nine numbers are column by column.
-    lattice.read_slice = [read = lattice.read_slice, count = x * y](int slice, double* values) {
-      read(slice, values);
-      for (std::int64_t i = 0; i < count; ++i) Eigen::Map<Eigen::Matrix3d>(values + 9 * i).transposeInPlace();
-    };
   return lattice;
 }
 

@@ -203,7 +203,9 @@ std::function<void(int z, double* values)> slices_of(RawVoxels voxels, const Eig
     for (int y = 0; y < size.y(); ++y)
       for (int x = 0; x < size.x(); ++x)
         for (int c = 0; c < components; ++c) {
-          const std::int64_t index = held->first + x * x_stride + y * y_stride + z * z_stride + c * component_stride;
+          const int component = held->by_columns ? c % 3 * 3 + c / 3 : c;
+          const std::int64_t index =
+              held->first + x * x_stride + y * y_stride + z * z_stride + component * component_stride;
           *values++ =
               held->slope * number_of(held->bytes.get() + index * held->type.bytes, held->order) + held->intercept;
         }

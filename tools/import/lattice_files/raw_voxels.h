@@ -70,6 +70,7 @@ struct RawVoxels {
   ByteOrder order = host_byte_order();
   std::int64_t first = 0;                 ///< Which number is component 0 of voxel (0, 0, 0).
   std::array<std::int64_t, 4> strides{};  ///< From one x, y, z or component to the next, in numbers; may be negative.
+  bool by_columns = false;                ///< The components are the columns of a 3 x 3 matrix, one after the other.
   double slope = 1, intercept = 0;        ///< The value is slope · number + intercept.
 };
 

@@ -11,7 +11,6 @@
 
 #include <Eigen/Geometry>
 
-#include "tools/import/lattices/fill_values.h"
 #include "tools/import/lattices/tensor_order.h"
 #include "volumes/grids/tensor_grid.h"
 
@@ -59,6 +58,16 @@ struct Lattice {
   /// size.y() * components numbers in all. Called once for each z, from size.z() − 1 down to 0.
   /// @throw std::runtime_error naming the file.
   std::function<void(int z, double* values)> read_slice;
+};
+
+/// Tensors or vectors that are what programs write where they have no data: a component of 1e18 or more (1e20, 1e30,
+/// netCDF's 9.97e36, the greatest float: also weighted by interpolation); or all components are one whole number of
+/// nines (-999, -9999, ...) or the least integer of 16 or 32 bits.
+struct FillValues {
+  std::size_t count = 0;
+  double example = 0;
+
+  void add(const double* components, int size);
 };
 
 /// Counts of the voxels.

@@ -1,19 +1,21 @@
 #include "tools/import/vtk/overlaps.h"
 
 #include <algorithm>
-#include <memory>
 
 #include <vtkBoundingBox.h>
 #include <vtkDataSet.h>
+#include <vtkGenericCell.h>
+#include <vtkNew.h>
 #include <vtkPoints.h>
+#include <vtkStaticCellLocator.h>
 
 namespace tensorray {
 namespace {
 
 struct Sampled {
   vtkBoundingBox box;
-  std::vector<CellCentre> centres;     ///< Of some cells of the highest dimensions.
-  std::unique_ptr<CellFinder> finder;  ///< Made when it is needed.
+  std::vector<CellCentre> centres;  ///< Of some cells of the highest dimensions.
+  CellFinder has;                   ///< Made when it is needed.
 };
 
 Sampled sampled(vtkDataSet& set) {
@@ -31,8 +33,8 @@ Sampled sampled(vtkDataSet& set) {
 bool has_some(Sampled& a, vtkDataSet& set, const Sampled& b) {
   return std::any_of(b.centres.begin(), b.centres.end(), [&](const CellCentre& centre) {
     if (!a.box.ContainsPoint(centre.position.data())) return false;
-    if (!a.finder) a.finder = std::make_unique<CellFinder>(set);
-    return a.finder->has(centre);
+    if (!a.has) a.has = cell_finder(set);
+    return a.has(centre);
   });
 }
 
@@ -46,17 +48,17 @@ CellCentre centre_of(vtkDataSet& set, vtkIdType id) {
   return {sum / static_cast<double>(std::max<vtkIdType>(1, cell->GetNumberOfPoints())), cell->GetCellDimension()};
 }
 
-CellFinder::CellFinder(vtkDataSet& set)
-    : weights_(static_cast<std::size_t>(std::max(32, set.GetMaxCellSize()))),
-      tolerance_(1e-12 * set.GetLength() * set.GetLength()) {
-  locator_->SetDataSet(&set);
-  locator_->BuildLocator();
-}
-
-bool CellFinder::has(const CellCentre& centre) {
-  Eigen::Vector3d position = centre.position, parametric;
-  const vtkIdType found = locator_->FindCell(position.data(), tolerance_, cell_, parametric.data(), weights_.data());
-  return found >= 0 && cell_->GetCellDimension() == centre.dimensions;
+CellFinder cell_finder(vtkDataSet& set) {
+  const auto locator = vtkSmartPointer<vtkStaticCellLocator>::New();
+  locator->SetDataSet(&set);
+  locator->BuildLocator();
+  std::vector<double> weights(static_cast<std::size_t>(std::max(32, set.GetMaxCellSize())));
+  const double squared_tolerance = 1e-12 * set.GetLength() * set.GetLength();
+  return [=, cell = vtkSmartPointer<vtkGenericCell>::New()](const CellCentre& centre) mutable {
+    Eigen::Vector3d position = centre.position, parametric;
+    return locator->FindCell(position.data(), squared_tolerance, cell, parametric.data(), weights.data()) >= 0 &&
+           cell->GetCellDimension() == centre.dimensions;
+  };
 }
 
 std::vector<int> overlapping_layers(const DataSets& sets) {

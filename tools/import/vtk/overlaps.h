@@ -2,12 +2,10 @@
 /// @file tools/import/vtk/overlaps.h
 /// Finds which data sets overlap.
 
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
-#include <vtkGenericCell.h>
-#include <vtkNew.h>
-#include <vtkStaticCellLocator.h>
 
 #include "tools/import/vtk/vtk_data_sets.h"
 
@@ -21,18 +19,9 @@ struct CellCentre {
 
 CellCentre centre_of(vtkDataSet& set, vtkIdType id);
 
-/// Finds cells of a data set, which must outlive it, at positions. Belongs to one thread.
-class CellFinder {
- public:
-  explicit CellFinder(vtkDataSet& set);
-  bool has(const CellCentre& centre);  ///< Whether a cell of the same dimensions is there.
-
- private:
-  vtkNew<vtkStaticCellLocator> locator_;
-  vtkNew<vtkGenericCell> cell_;
-  std::vector<double> weights_;
-  double tolerance_;  ///< Squared.
-};
+/// Whether a cell of a data set, which must outlive this, is at a centre, and has as many dimensions. For one thread.
+using CellFinder = std::function<bool(const CellCentre&)>;
+CellFinder cell_finder(vtkDataSet& set);
 
 /// Divides data sets into layers, from 0 on, so that none overlaps another one of its layer. Tries up to 4096 cells of
 /// each set where its box intersects that of another one. Faces in common are no overlap.

@@ -15,12 +15,9 @@
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
 #include <vtkIdList.h>
-#include <vtkImageData.h>
 #include <vtkIntArray.h>
-#include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
-#include <vtkRectilinearGrid.h>
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
@@ -46,50 +43,40 @@ void collect(vtkDataObject* data, DataSets& pieces) {
   }
 }
 
-/// Keeps only `bits` of the ghost array of `attributes`; removes the array if all its values become zero.
-void keep_ghosts(vtkDataSetAttributes& attributes, unsigned char bits) {
-  const char* const name = vtkDataSetAttributes::GhostArrayName();
-  const auto* const ghosts = vtkUnsignedCharArray::SafeDownCast(attributes.GetArray(name));
-  if (!ghosts) return;
-  vtkNew<vtkUnsignedCharArray> kept;
-  kept->SetName(name);
-  kept->SetNumberOfValues(ghosts->GetNumberOfValues());
-  bool any = false;
-  for (vtkIdType i = 0; i < kept->GetNumberOfValues(); ++i) {
-    kept->SetValue(i, ghosts->GetValue(i) & bits);
-    any = any || kept->GetValue(i) != 0;
-  }
-  attributes.RemoveArray(name);
-  if (any) attributes.AddArray(kept);
+vtkUnsignedCharArray* ghosts_of(vtkDataSetAttributes& attributes) {
+  return vtkUnsignedCharArray::SafeDownCast(attributes.GetArray(vtkDataSetAttributes::GhostArrayName()));
+}
+
+/// The bits of ghosts, as an array with a name.
+vtkNew<vtkUnsignedCharArray> masked(vtkUnsignedCharArray& ghosts, int bits, const char* name) {
+  vtkNew<vtkUnsignedCharArray> marks;
+  marks->SetName(name);
+  for (vtkIdType i = 0; i < ghosts.GetNumberOfValues(); ++i)
+    marks->InsertNextValue(static_cast<unsigned char>(ghosts.GetValue(i) & bits));
+  return marks;
 }
 
 /// Marks only what is hidden; refined cells are covered by others. Copies of neighbours' cells and points have the
 /// neighbours' values, and stay.
 void keep_hidden(vtkDataSet& piece) {
-  keep_ghosts(*piece.GetCellData(), vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL);
-  keep_ghosts(*piece.GetPointData(), vtkDataSetAttributes::HIDDENPOINT);
-}
-
-const vtkUnsignedCharArray* ghosts_of(vtkDataSetAttributes& attributes) {
-  return vtkUnsignedCharArray::SafeDownCast(attributes.GetArray(vtkDataSetAttributes::GhostArrayName()));
+  constexpr int cells = vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
+  for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL})
+    if (vtkUnsignedCharArray* const ghosts = ghosts_of(*piece.GetAttributes(type))) {
+      const char* const name = vtkDataSetAttributes::GhostArrayName();
+      const auto kept = masked(*ghosts, type == vtkDataObject::CELL ? cells : vtkDataSetAttributes::HIDDENPOINT, name);
+      piece.GetAttributes(type)->RemoveArray(name);
+      if (kept->GetValueRange()[1] > 0) piece.GetAttributes(type)->AddArray(kept);
+    }
 }
 
 /// Marks points that are copies of another piece's, and may be stale.
 constexpr const char* copied_points = "tensorray:copied";
 
-void mark_copied_points(vtkDataSet& piece, const vtkUnsignedCharArray& ghosts) {
-  vtkNew<vtkUnsignedCharArray> marks;
-  marks->SetName(copied_points);
-  for (vtkIdType i = 0; i < ghosts.GetNumberOfValues(); ++i)
-    marks->InsertNextValue(ghosts.GetValue(i) & vtkDataSetAttributes::DUPLICATEPOINT);
-  piece.GetPointData()->AddArray(marks);
-}
-
 /// The piece without the cells that are to be left out beside other pieces: copies of neighbours' cells, hidden cells,
 /// and those with a hidden point.
 vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
-  const auto* const cells = ghosts_of(*piece.GetCellData());
-  const auto* const points = ghosts_of(*piece.GetPointData());
+  vtkUnsignedCharArray* const cells = ghosts_of(*piece.GetCellData());
+  vtkUnsignedCharArray* const points = ghosts_of(*piece.GetPointData());
   if (!cells && !points) return &piece;
   constexpr unsigned char used = 0, copy = vtkDataSetAttributes::DUPLICATECELL;
   constexpr unsigned char unused =
@@ -104,7 +91,7 @@ vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
       is_unused = is_unused || (points->GetValue(ids->GetId(i)) & vtkDataSetAttributes::HIDDENPOINT) != 0;
     marks->InsertNextValue(is_unused ? copy : used);
   }
-  if (points) mark_copied_points(piece, *points);
+  if (points) piece.GetPointData()->AddArray(masked(*points, vtkDataSetAttributes::DUPLICATEPOINT, copied_points));
   for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL})
     piece.GetAttributes(type)->RemoveArray(vtkDataSetAttributes::GhostArrayName());
   vtkNew<vtkAppendFilter> to_unstructured;
@@ -119,17 +106,17 @@ vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
 
 /// Hides copies of cells where the piece has the cells themselves, whose values are never stale.
 void hide_covered_copies(vtkDataSet& piece) {
-  const auto* const ghosts = ghosts_of(*piece.GetCellData());
+  vtkUnsignedCharArray* const ghosts = ghosts_of(*piece.GetCellData());
   if (!ghosts || !piece.IsA("vtkUnstructuredGrid")) return;
   const auto copy = vtkSmartPointer<vtkDataSet>::Take(piece.NewInstance());
   copy->ShallowCopy(&piece);
   const vtkSmartPointer<vtkDataSet> own = used_part(*copy);
   if (own->GetNumberOfCells() == 0 || own->GetNumberOfCells() == piece.GetNumberOfCells()) return;
-  CellFinder finder(*own);
+  const CellFinder has_own = cell_finder(*own);
   vtkNew<vtkUnsignedCharArray> marks;
-  marks->DeepCopy(const_cast<vtkUnsignedCharArray*>(ghosts));  // It is only read.
+  marks->DeepCopy(ghosts);
   for (vtkIdType cell = 0; cell < piece.GetNumberOfCells(); ++cell)
-    if ((ghosts->GetValue(cell) & vtkDataSetAttributes::DUPLICATECELL) != 0 && finder.has(centre_of(piece, cell)))
+    if ((ghosts->GetValue(cell) & vtkDataSetAttributes::DUPLICATECELL) != 0 && has_own(centre_of(piece, cell)))
       marks->SetValue(cell, ghosts->GetValue(cell) | vtkDataSetAttributes::HIDDENCELL);
   piece.GetCellData()->AddArray(marks);
 }
@@ -218,51 +205,26 @@ bool is_finite(vtkDataArray& array, vtkIdType tuple) {
   return true;
 }
 
-/// A piece, the arrays of its points that it had from the beginning, and which of its points are copies.
-struct Piece {
-  vtkSmartPointer<vtkDataSet> set;
-  std::set<std::string> known;
-  vtkSmartPointer<vtkUnsignedCharArray> copies;  ///< Null: none.
-};
-
 /// Gives points of `all` the values that the piece with cells from `first` on has there, if they are finite.
 /// @param copies  Of the piece's copies of points alone, or of all others.
-void take_values(vtkUnstructuredGrid& all, vtkIdType first, const Piece& piece, bool copies) {
+void take_values(vtkUnstructuredGrid& all, vtkIdType first, vtkDataSet& piece, bool copies) {
+  vtkDataArray* const marks = piece.GetPointData()->GetArray(copied_points);  // NaN: a piece without copies.
+  if (copies && !marks) return;
   vtkNew<vtkIdList> from, to;
-  for (vtkIdType cell = 0; cell < piece.set->GetNumberOfCells(); ++cell) {
-    piece.set->GetCellPoints(cell, from);
+  for (vtkIdType cell = 0; cell < piece.GetNumberOfCells(); ++cell) {
+    piece.GetCellPoints(cell, from);
     all.GetCellPoints(first + cell, to);
-    for (const std::string& name : piece.known) {
-      vtkDataArray* const values = piece.set->GetPointData()->GetArray(name.c_str());
-      vtkDataArray* const merged = all.GetPointData()->GetArray(name.c_str());
-      for (vtkIdType i = 0; merged && i < from->GetNumberOfIds() && i < to->GetNumberOfIds(); ++i) {
+    for (int k = 0; k < all.GetPointData()->GetNumberOfArrays(); ++k) {
+      vtkDataArray* const merged = all.GetPointData()->GetArray(k);
+      vtkDataArray* const values =
+          merged && merged->GetName() ? piece.GetPointData()->GetArray(merged->GetName()) : nullptr;
+      for (vtkIdType i = 0; values && i < from->GetNumberOfIds() && i < to->GetNumberOfIds(); ++i) {
         const vtkIdType point = from->GetId(i);
-        if ((piece.copies && piece.copies->GetValue(point) != 0) == copies && is_finite(*values, point))
+        if ((marks && marks->GetComponent(point, 0) > 0) == copies && is_finite(*values, point))
           merged->SetTuple(to->GetId(i), point, values);
       }
     }
   }
-}
-
-/// Gives each point of `all` the values of the first piece that has it, not as a copy if there is another, and finite
-/// values there. The cells of `all` are those of the pieces, in their order.
-void take_known_values(vtkUnstructuredGrid& all, const std::vector<Piece>& pieces) {
-  for (const bool copies : {true, false}) {
-    vtkIdType end = all.GetNumberOfCells();
-    for (std::size_t k = pieces.size(); k-- > 0;) {
-      end -= pieces[k].set->GetNumberOfCells();
-      if (copies && !pieces[k].copies) continue;
-      take_values(all, end, pieces[k], copies);
-    }
-  }
-}
-
-std::set<std::string> point_arrays(vtkDataSet& piece) {
-  std::set<std::string> names;
-  for (int i = 0; i < piece.GetPointData()->GetNumberOfArrays(); ++i)
-    if (vtkDataArray* const array = piece.GetPointData()->GetArray(i); array && array->GetName())
-      names.insert(array->GetName());
-  return names;
 }
 
 vtkSmartPointer<vtkUnstructuredGrid> appended(const DataSets& sets, bool merges_points) {
@@ -275,12 +237,18 @@ vtkSmartPointer<vtkUnstructuredGrid> appended(const DataSets& sets, bool merges_
   return append->GetOutput();
 }
 
-/// One grid of pieces that do not overlap.
-vtkSmartPointer<vtkDataSet> merged_layer(const std::vector<Piece>& pieces, bool merges_points) {
-  DataSets sets;
-  for (const Piece& piece : pieces) sets.push_back(piece.set);
-  const vtkSmartPointer<vtkUnstructuredGrid> all = appended(sets, merges_points);
-  take_known_values(*all, pieces);
+/// One grid of pieces that do not overlap. Each point has the values of the first piece that has it, not as a copy if
+/// there is another, and finite values there.
+vtkSmartPointer<vtkDataSet> merged_layer(const DataSets& pieces, bool merges_points) {
+  const vtkSmartPointer<vtkUnstructuredGrid> all = appended(pieces, merges_points);
+  for (const bool copies : {true, false}) {
+    vtkIdType end = all->GetNumberOfCells();  // Its cells are those of the pieces, in their order.
+    for (std::size_t k = pieces.size(); k-- > 0;) {
+      end -= pieces[k]->GetNumberOfCells();
+      take_values(*all, end, *pieces[k], copies);
+    }
+  }
+  all->GetPointData()->RemoveArray(copied_points);
   return all;
 }
 
@@ -296,23 +264,6 @@ vtkSmartPointer<vtkDataSet> stacked(const DataSets& layers) {
   return appended(layers, false);
 }
 
-bool is_same_image(vtkImageData& a, vtkImageData& b) {
-  const double* const of_a = a.GetIndexToPhysicalMatrix()->GetData();
-  const double* const of_b = b.GetIndexToPhysicalMatrix()->GetData();
-  return std::equal(a.GetExtent(), a.GetExtent() + 6, b.GetExtent()) && std::equal(of_a, of_a + 16, of_b);
-}
-
-bool is_same_grid(vtkRectilinearGrid& a, vtkRectilinearGrid& b) {
-  const auto is_equal = [](vtkDataArray* one, vtkDataArray* other) {
-    if (!one || !other || one->GetNumberOfTuples() != other->GetNumberOfTuples()) return one == other;
-    for (vtkIdType i = 0; i < one->GetNumberOfTuples(); ++i)
-      if (one->GetComponent(i, 0) != other->GetComponent(i, 0)) return false;
-    return true;
-  };
-  return is_equal(a.GetXCoordinates(), b.GetXCoordinates()) && is_equal(a.GetYCoordinates(), b.GetYCoordinates()) &&
-         is_equal(a.GetZCoordinates(), b.GetZCoordinates());
-}
-
 }  // namespace
 
 DataSets data_sets_in(vtkDataObject* data) {
@@ -323,10 +274,14 @@ DataSets data_sets_in(vtkDataObject* data) {
 
 bool is_same_mesh(vtkDataSet& a, vtkDataSet& b) {
   if (a.GetNumberOfPoints() != b.GetNumberOfPoints() || a.GetNumberOfCells() != b.GetNumberOfCells()) return false;
-  if (vtkImageData::SafeDownCast(&a) && vtkImageData::SafeDownCast(&b))
-    return is_same_image(*vtkImageData::SafeDownCast(&a), *vtkImageData::SafeDownCast(&b));
-  if (vtkRectilinearGrid::SafeDownCast(&a) && vtkRectilinearGrid::SafeDownCast(&b))
-    return is_same_grid(*vtkRectilinearGrid::SafeDownCast(&a), *vtkRectilinearGrid::SafeDownCast(&b));
+  for (vtkIdType i = 0; i < a.GetNumberOfPoints(); ++i) {
+    std::array<double, 3> x{}, y{};
+    a.GetPoint(i, x.data());
+    b.GetPoint(i, y.data());
+    if (x != y) return false;
+  }
+  const auto is_regular = [](vtkDataSet& set) { return set.IsA("vtkImageData") || set.IsA("vtkRectilinearGrid"); };
+  if (is_regular(a) && is_regular(b)) return true;  // Their cells follow from their points.
   vtkNew<vtkIdList> of_a, of_b;
   for (vtkIdType id = 0; id < a.GetNumberOfCells(); ++id) {
     a.GetCellPoints(id, of_a);
@@ -334,12 +289,6 @@ bool is_same_mesh(vtkDataSet& a, vtkDataSet& b) {
     if (a.GetCellType(id) != b.GetCellType(id) || of_a->GetNumberOfIds() != of_b->GetNumberOfIds() ||
         !std::equal(of_a->begin(), of_a->end(), of_b->begin()))
       return false;
-  }
-  for (vtkIdType i = 0; i < a.GetNumberOfPoints(); ++i) {
-    std::array<double, 3> x{}, y{};
-    a.GetPoint(i, x.data());
-    b.GetPoint(i, y.data());
-    if (x != y) return false;
   }
   return true;
 }
@@ -353,21 +302,14 @@ vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& given, bool merges_poin
   }
   DataSets sets;
   for (vtkDataSet* const piece : given) sets.push_back(used_part(*piece));
-  std::vector<Piece> pieces;
-  for (const auto& set : sets) {
-    const vtkSmartPointer<vtkUnsignedCharArray> copies =
-        vtkUnsignedCharArray::SafeDownCast(set->GetPointData()->GetArray(copied_points));
-    set->GetPointData()->RemoveArray(copied_points);
-    pieces.push_back({set, point_arrays(*set), copies});
-  }
   unify_arrays(sets, vtkDataObject::POINT);
   unify_arrays(sets, vtkDataObject::CELL);
   const std::vector<int> layers = overlapping_layers(sets);
   DataSets merged;
   for (int layer = 0; layer <= *std::max_element(layers.begin(), layers.end()); ++layer) {
-    std::vector<Piece> of_layer;
-    for (std::size_t k = 0; k < pieces.size(); ++k)
-      if (layers[k] == layer) of_layer.push_back(pieces[k]);
+    DataSets of_layer;
+    for (std::size_t k = 0; k < sets.size(); ++k)
+      if (layers[k] == layer) of_layer.push_back(sets[k]);
     merged.push_back(merged_layer(of_layer, merges_points));
   }
   return merged.size() == 1 ? merged.front() : stacked(merged);

@@ -4,11 +4,8 @@
 /// Names that are there stay.
 
 #include <filesystem>
-#include <string>
-#include <vector>
 
 class vtkDataSet;
-class vtkExodusIIReader;
 
 namespace tensorray {
 
@@ -20,12 +17,5 @@ void name_active_tensors(vtkDataSet& data);
 
 /// The arrays that a legacy file calls TENSORS6. VTK keeps this of one of them only.
 void name_tensors6(vtkDataSet& data, const std::filesystem::path& path);
-
-/// The variables of an ExodusII file, of nodes or of elements, in its order; none if they cannot be read.
-std::vector<std::string> exodus_variables(const std::filesystem::path& path, bool of_cells);
-
-/// The arrays that VTK's reader of ExodusII makes of several variables (stress_xx, stress_xy, stress_xz become a vector
-/// stress_x): as these are called in the file. @param data  What the reader has read from `path`.
-void name_components(vtkDataSet& data, vtkExodusIIReader& reader, const std::filesystem::path& path);
 
 }  // namespace tensorray

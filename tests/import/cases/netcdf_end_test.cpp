@@ -1,4 +1,4 @@
-#include "tools/import/vtk_formats/netcdf_end.h"
+#include "tools/import/cases/exodus.h"
 
 #include <limits>
 #include <string>

@@ -1,5 +1,3 @@
-#include "tools/import/vtk_formats/netcdf_end.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +9,7 @@
 
 #include "base/errors.h"
 #include "base/text/byte_order.h"
+#include "tools/import/cases/exodus.h"
 
 namespace tensorray {
 namespace {
@@ -79,47 +78,36 @@ class Header {
   int version_ = 0;
 };
 
-struct Variable {
-  double begin = 0, size = 0;
-  bool is_record = false;
-};
-
-Variable read_variable(Header& header, const std::vector<double>& dimensions) {
-  Variable variable{0, 1, false};
-  header.skip_name();
-  for (double left = header.count(); left > 0; --left) {
-    const double dimension = header.count();
-    if (dimension >= static_cast<double>(dimensions.size())) throw BadHeader();
-    const double extent = dimensions[static_cast<std::size_t>(dimension)];
-    if (extent == 0) variable.is_record = true;
-    if (extent != 0) variable.size *= extent;
-  }
-  header.skip_attributes();
-  variable.size *= header.type_size();
-  header.count();  // The size itself, which overflows for large variables.
-  variable.begin = header.offset();
-  return variable;
-}
-
 double needed_size(Header& header) {
   const double records = header.count();
   if (records == 0xffffffffu) throw BadHeader();  // The value means "count the records": the file was never closed.
   std::vector<double> dimensions;                 // 0 marks that of the records.
+  double needed = 0, record_end = 0, record_size = 0;
   header.list([&] {
     header.skip_name();
     dimensions.push_back(header.count());
+    needed = std::max(needed, dimensions.back());  // For which readers take memory.
   });
   header.skip_attributes();
-  std::vector<Variable> variables;
-  header.list([&] { variables.push_back(read_variable(header, dimensions)); });
-  double record_size = 0, size = 0;
-  for (const Variable& variable : variables)
-    if (variable.is_record) record_size += Header::padded(variable.size);
-  for (const double dimension : dimensions) size = std::max(size, dimension);  // For which readers take memory.
-  for (const Variable& variable : variables)
-    if (!variable.is_record || records > 0)
-      size = std::max(size, variable.begin + variable.size + (variable.is_record ? (records - 1) * record_size : 0));
-  return size;
+  header.list([&] {
+    header.skip_name();
+    double size = 1;
+    bool is_record = false;
+    for (double left = header.count(); left > 0; --left) {
+      const double dimension = header.count();
+      if (dimension >= static_cast<double>(dimensions.size())) throw BadHeader();
+      const double extent = dimensions[static_cast<std::size_t>(dimension)];
+      is_record = is_record || extent == 0;
+      size *= extent == 0 ? 1 : extent;
+    }
+    header.skip_attributes();
+    size *= header.type_size();
+    header.count();  // The size itself, which overflows for large variables.
+    double& end = is_record ? record_end : needed;
+    end = std::max(end, header.offset() + size);
+    if (is_record) record_size += Header::padded(size);
+  });
+  return record_end > 0 && records > 0 ? std::max(needed, record_end + (records - 1) * record_size) : needed;
 }
 
 }  // namespace
