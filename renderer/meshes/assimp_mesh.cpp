@@ -22,7 +22,6 @@
 
 #include "base/process/child_program.h"
 #include "base/text/text.h"
-#include "renderer/meshes/gltf.h"
 #include "renderer/meshes/mesh_readers.h"
 
 namespace tensorray {

@@ -1,18 +1,18 @@
-#include "renderer/meshes/gltf.h"
-
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstring>
 #include <fstream>
 #include <iterator>
+#include <limits>
+#include <map>
 #include <set>
 #include <stdexcept>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "base/text/byte_order.h"
 #include "base/text/text.h"
+#include "renderer/meshes/mesh_readers.h"
 
 namespace tensorray {
 namespace {
@@ -34,14 +34,12 @@ std::string contents_of(const fs::path& path) {
 Json json_of(const fs::path& path, Files& files) {
   const std::string bytes = contents_of(path);
   if (!starts_with(bytes, "glTF")) return Json::parse(bytes, nullptr, false);
-  const auto length_at = [&](std::size_t at) {
-    std::uint32_t number = 0;
-    if (at + 8 <= bytes.size()) std::memcpy(&number, &bytes[at], sizeof number);
-    return std::min<std::size_t>(number, bytes.size() - std::min(bytes.size(), at + 8));
+  const auto chunk = [&](std::size_t at) {
+    return at + 8 > bytes.size() ? "" : bytes.substr(at + 8, read_number<std::uint32_t>(&bytes[at], ByteOrder::little));
   };
-  const std::size_t length = length_at(12), next = 20 + length;
-  if (next + 8 <= bytes.size()) files[binary_name] = bytes.substr(next + 8, length_at(next));
-  return Json::parse(bytes.substr(std::min<std::size_t>(20, bytes.size()), length), nullptr, false);
+  const std::string json = chunk(12);
+  files[binary_name] = chunk(20 + json.size());
+  return Json::parse(json, nullptr, false);
 }
 
 std::string decoded_base64(const std::string& text) {
@@ -71,31 +69,34 @@ const std::string& buffer_of(const fs::path& path, const Json& json, std::size_t
   return found->second;
 }
 
-bool is_integer(int type) { return type >= 5120 && type <= 5123; }  // Signed and not, of 1 byte; then of 2.
-std::size_t bytes_of(int type) { return type < 5122 ? 1 : 2; }
-
 /// The format's rule: a normalised integer is the number divided by its greatest, and not below −1.
-float float_of(const char* bytes, int type, bool is_normalized) {
-  const bool is_signed = type % 2 == 0;
-  const int bits = 8 * static_cast<int>(bytes_of(type));
-  int number = static_cast<unsigned char>(bytes[0]);
-  if (bits == 16) number |= static_cast<unsigned char>(bytes[1]) << 8;
-  if (is_signed && number >= 1 << (bits - 1)) number -= 1 << bits;
-  const auto greatest = static_cast<float>((1 << (is_signed ? bits - 1 : bits)) - 1);
-  return is_normalized ? std::max(-1.0F, static_cast<float>(number) / greatest) : static_cast<float>(number);
+template <class Integer>
+float float_of(const char* bytes, bool is_normalized) {
+  const auto number = static_cast<float>(read_number<Integer>(bytes, ByteOrder::little));
+  return is_normalized ? std::max(-1.0F, number / static_cast<float>(std::numeric_limits<Integer>::max())) : number;
 }
+
+struct IntegerType {
+  std::size_t bytes;
+  float (*read)(const char* bytes, bool is_normalized);
+};
+
+const std::map<int, IntegerType> integer_types{{5120, {1, float_of<std::int8_t>}},
+                                               {5121, {1, float_of<std::uint8_t>}},
+                                               {5122, {2, float_of<std::int16_t>}},
+                                               {5123, {2, float_of<std::uint16_t>}}};
 
 /// Makes an accessor of three integers one of three floats.
 void make_floats(const fs::path& path, Json& json, std::size_t index, Files& files) {
   Json& accessor = json.at("accessors").at(index);
-  const int type = accessor.at("componentType").get<int>();
-  if (!is_integer(type) || !accessor.contains("bufferView")) return;
+  const auto type = integer_types.find(accessor.at("componentType").get<int>());
+  if (type == integer_types.end() || !accessor.contains("bufferView")) return;
   const std::string name = "its accessor " + std::to_string(index);
   if (accessor.contains("sparse") || accessor.value("type", "") != "VEC3")
     throw std::runtime_error(name + " has sparse integers, or not three; write it again without quantization");
   const Json view = json.at("bufferViews").at(accessor.at("bufferView").get<std::size_t>());
   const std::string& bytes = buffer_of(path, json, view.at("buffer").get<std::size_t>(), files);
-  const std::size_t count = accessor.at("count").get<std::size_t>(), size = 3 * bytes_of(type);
+  const std::size_t count = accessor.at("count").get<std::size_t>(), size = 3 * type->second.bytes;
   const std::size_t stride = view.value("byteStride", size);
   const std::size_t first = view.value("byteOffset", std::size_t{0}) + accessor.value("byteOffset", std::size_t{0});
   if (count == 0 || stride < size || first > bytes.size() || (bytes.size() - first + stride - size) / stride < count)
@@ -104,9 +105,8 @@ void make_floats(const fs::path& path, Json& json, std::size_t index, Files& fil
   json["bufferViews"].push_back(
       {{"buffer", json.at("buffers").size()}, {"byteOffset", floats.size()}, {"byteLength", 12 * count}});
   for (std::size_t i = 0; i < 3 * count; ++i) {
-    const char* const at = &bytes[first + i / 3 * stride + i % 3 * bytes_of(type)];
-    const float value = float_of(at, type, accessor.value("normalized", false));
-    floats.append(reinterpret_cast<const char*>(&value), sizeof value);
+    const char* const at = &bytes[first + i / 3 * stride + i % 3 * type->second.bytes];
+    append_number(type->second.read(at, accessor.value("normalized", false)), ByteOrder::little, floats);
   }
   accessor["bufferView"] = json["bufferViews"].size() - 1;
   accessor["componentType"] = 5126;

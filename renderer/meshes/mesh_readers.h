@@ -5,6 +5,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "renderer/meshes/mesh.h"
@@ -34,6 +36,14 @@ MeshWithNormals read_assimp_mesh(const std::filesystem::path& path);
 /// What `tensorray --read-mesh` does: reads the file in this process, and writes the mesh to `exchange`, in place and
 /// in the machine's byte order.
 void write_assimp_mesh(const std::filesystem::path& path, const std::filesystem::path& exchange);
+
+/// What assimp does not read rightly of glTF 2.0, prepared for it: files by their names, which stand beside a .gltf or
+/// .glb whose positions and normals are integers (KHR_mesh_quantization); gltf_in_memory_name, which is to be
+/// read instead, has floats. Empty if there are none, or the file is no glTF 2.0.
+/// @throw std::runtime_error that names an extension which is required, and whose geometry would be lost; or if
+/// integers are beyond their buffer.
+std::map<std::string, std::string> gltf_in_memory(const std::filesystem::path& path);
+constexpr const char* gltf_in_memory_name = "tensorray.gltf";
 
 /// Adds a polygon as triangles, with the order of its corners. A convex polygon becomes a fan; of others, ears are cut
 /// off (Meisters 1975) as seen along the polygon's normal (Newell's). Corners that lie on a line between their

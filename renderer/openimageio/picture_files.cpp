@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <set>
@@ -129,20 +130,15 @@ std::vector<std::string> prefixes(const OIIO::ImageSpec& spec) {
 
 /// Finds the colour channels without a layer's name, or those of the first layer that has colours.
 bool find_rgb(const OIIO::ImageSpec& spec, NativeImage& image) {
-  if (find_rgb_of(spec, "", image)) return true;
   const std::vector<std::string> all = prefixes(spec);
-  return std::any_of(all.begin(), all.end(), [&](const std::string& each) { return find_rgb_of(spec, each, image); });
+  return find_rgb_of(spec, "", image) ||
+         std::any_of(all.begin(), all.end(), [&](const std::string& each) { return find_rgb_of(spec, each, image); });
 }
 
 bool find_grey(const OIIO::ImageSpec& spec, NativeImage& image) {
-  image.alpha = find_channel(spec, "A");
-  int grey = find_channel(spec, "Y");
-  if (spec.nchannels == 1) {
-    grey = 0;
-    image.alpha = -1;
-  } else if (spec.nchannels == 2 && image.alpha >= 0) {
-    grey = 1 - image.alpha;
-  }
+  image.alpha = spec.nchannels == 1 ? -1 : find_channel(spec, "A");
+  int grey = spec.nchannels == 1 ? 0 : find_channel(spec, "Y");
+  if (spec.nchannels == 2 && image.alpha >= 0) grey = 1 - image.alpha;
   image.rgb = {grey, grey, grey};
   return grey >= 0;
 }
@@ -171,12 +167,6 @@ std::vector<std::string> layers_of(OIIO::ImageInput& input) {
   return known;
 }
 
-[[noreturn]] void throw_no_layer(OIIO::ImageInput& input, const std::string& layer) {
-  const std::vector<std::string> known = layers_of(input);
-  throw std::runtime_error("it has no layer \"" + layer +
-                           "\"; its layers: " + (known.empty() ? "none" : joined(known)));
-}
-
 /// Says which part or layer was taken, unless it is the first part's without a layer, and no other part has such ones.
 void say_choice(OIIO::ImageInput& input, int part, NativeImage& image) {
   const std::vector<std::string> known = layers_of(input);
@@ -195,15 +185,15 @@ void say_choice(OIIO::ImageInput& input, int part, NativeImage& image) {
 /// else of a layer. Grey is taken if there are no colours, by its name before any single channel (depth). @return the
 /// part.
 int find_colors(OIIO::ImageInput& input, NativeImage& image) {
-  const auto find_plain = [](const OIIO::ImageSpec& spec, NativeImage& found) { return find_rgb_of(spec, "", found); };
-  const auto find_y = [](const OIIO::ImageSpec& spec, NativeImage& found) {
-    return find_channel(spec, "Y") >= 0 && find_grey(spec, found);
-  };
-  using Find = bool (*)(const OIIO::ImageSpec&, NativeImage&);
+  using Spec = const OIIO::ImageSpec&;
+  const std::function<bool(Spec)> finders[] = {
+      [&](Spec spec) { return find_rgb_of(spec, "", image); }, [&](Spec spec) { return find_rgb(spec, image); },
+      [&](Spec spec) { return find_channel(spec, "Y") >= 0 && find_grey(spec, image); },
+      [&](Spec spec) { return find_grey(spec, image); }};
   const bool has_parts = is_exr(input) && input.seek_subimage(1, 0);
-  for (const Find find : {Find(find_plain), Find(find_rgb), Find(find_y), Find(find_grey)})
+  for (const auto& finds : finders)
     for (int part = 0; (part == 0 || has_parts) && input.seek_subimage(part, 0); ++part)
-      if (!(has_parts && input.spec().deep) && find(input.spec(), image)) return part;
+      if (!(has_parts && input.spec().deep) && finds(input.spec())) return part;
   input.seek_subimage(0, 0);
   throw std::runtime_error("it has no channels R, G, B, nor grey (Y); its channels: " +
                            joined(input.spec().channelnames));
@@ -218,7 +208,9 @@ int find_channels(OIIO::ImageInput& input, const std::string& layer, NativeImage
   }
   for (int part = 0; input.seek_subimage(part, 0); ++part)
     if (find_layer(input.spec(), layer, image)) return part;
-  throw_no_layer(input, layer);
+  const std::vector<std::string> known = layers_of(input);
+  throw std::runtime_error("it has no layer \"" + layer +
+                           "\"; its layers: " + (known.empty() ? "none" : joined(known)));
 }
 
 /// Makes the channels' indices count from the first one that is needed.

@@ -16,6 +16,7 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+using Place = std::array<double, 3>;
 
 constexpr double same_place = 1e-8;       // Of the size of a mesh.
 constexpr double feature_cosine = 0.866;  // Of 30°.
@@ -29,9 +30,8 @@ struct BodyEdge {
   std::vector<Vector3d> normals;  ///< Of its faces.
 };
 
-/// Vertices at one place are one, as meshes may have one for each triangle.
-std::vector<BodyEdge> edges_of(const TriangleMesh& mesh) {
-  using Place = std::array<double, 3>;
+/// By the places of their ends: vertices at one place are one, as meshes may have one for each triangle.
+std::map<std::pair<Place, Place>, BodyEdge> edges_of(const TriangleMesh& mesh) {
   const double grid = same_place * mesh.bounds().diagonal().norm();
   const auto place_of = [&](const Vector3d& at) {
     return Place{std::round(at.x() / grid), std::round(at.y() / grid), std::round(at.z() / grid)};
@@ -49,25 +49,23 @@ std::vector<BodyEdge> edges_of(const TriangleMesh& mesh) {
       edge.normals.push_back(normal);
     }
   }
-  std::vector<BodyEdge> list;
-  for (auto& [key, edge] : edges) list.push_back(std::move(edge));
-  return list;
+  return edges;
 }
 
 /// @param normals  Changed. @param towards  To the viewer.
 bool is_drawn(std::vector<Vector3d>& normals, const Vector3d& towards) {
+  const auto normal = [&](std::size_t i) { return normals.begin() + static_cast<std::ptrdiff_t>(i); };
   for (std::size_t i = 0; normals.size() > 2 && i < normals.size();) {  // Faces that lie on each other do not count.
-    const auto opposite = std::find_if(normals.begin() + static_cast<std::ptrdiff_t>(i) + 1, normals.end(),
+    const auto opposite = std::find_if(normal(i + 1), normals.end(),
                                        [&](const Vector3d& other) { return (normals[i] + other).norm() < along_view; });
     if (opposite == normals.end()) {
       ++i;
-    } else {
-      normals.erase(opposite);
-      normals.erase(normals.begin() + static_cast<std::ptrdiff_t>(i));
+      continue;
     }
+    normals.erase(opposite);
+    normals.erase(normal(i));
   }
-  const Vector3d none = Vector3d::Zero();
-  if (std::find(normals.begin(), normals.end(), none) != normals.end()) return false;  // A triangle without an area.
+  if (std::count(normals.begin(), normals.end(), Vector3d(0, 0, 0)) > 0) return false;  // A triangle without an area.
   if (normals.size() < 2) return !normals.empty();
   const double a = normals[0].dot(towards), b = normals[1].dot(towards);
   return normals[0].dot(normals[1]) < feature_cosine || ((a > 0) != (b > 0) && std::abs(a - b) > along_view);
@@ -99,7 +97,7 @@ std::vector<OutlineStroke> body_outline(const std::vector<TriangleMesh>& bodies,
     }
   };
   for (const TriangleMesh& body : bodies)
-    for (BodyEdge& edge : edges_of(body))
+    for (auto& [places, edge] : edges_of(body))
       if (is_drawn(edge.normals, towards))
         add(edge, std::accumulate(edge.normals.begin(), edge.normals.end(), Vector3d(0, 0, 0)).normalized());
   return strokes;

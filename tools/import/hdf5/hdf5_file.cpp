@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <stdexcept>
 #include <utility>
 
 #include <vtkDataArray.h>
@@ -81,6 +80,14 @@ bool is_written(hid_t data, const HyperSlab& part) {
 }
 
 }  // namespace
+
+bool HyperSlab::is_inside(const std::vector<std::uint64_t>& shape) const {
+  const std::size_t rank = shape.size();
+  bool fits = start.size() == rank && stride.size() == rank && count.size() == rank;
+  for (std::size_t i = 0; fits && i < rank; ++i)  // Not by multiplying, which overflows for hostile numbers.
+    fits = stride[i] > 0 && count[i] <= (start[i] < shape[i] ? (shape[i] - 1 - start[i]) / stride[i] + 1 : 0);
+  return fits;
+}
 
 struct Hdf5File::Handle {
   Id id;
@@ -204,16 +211,12 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset) const {
 
 vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const HyperSlab& part) const {
   const std::vector<std::uint64_t> extents = shape(dataset);
-  const bool fits = part.start.size() == extents.size() && part.stride.size() == extents.size() &&
-                    part.count.size() == extents.size();
+  if (!part.is_inside(extents))
+    fail("its dataset " + dataset + " is smaller than what is wanted of it: cut off, or of another mesh");
   std::uint64_t count = 1;
-  for (std::size_t i = 0; i < extents.size(); ++i) {
-    if (!fits || part.stride[i] < 1 || part.start[i] > extents[i] ||
-        (part.count[i] > 0 && (part.count[i] - 1) > (extents[i] - part.start[i]) / part.stride[i]) ||
-        (part.count[i] > 0 && part.start[i] + (part.count[i] - 1) * part.stride[i] >= extents[i]))
-      fail("its dataset " + dataset + " is smaller than what is wanted of it: cut off, or of another mesh");
-    if (part.count[i] > 0 && count > ~std::uint64_t{0} / part.count[i]) fail("its dataset " + dataset + " is damaged");
-    count *= part.count[i];
+  for (const std::uint64_t extent : part.count) {
+    if (extent > 0 && count > ~std::uint64_t{0} / extent) fail("its dataset " + dataset + " is damaged");
+    count *= extent;
   }
   require_sources(dataset, 0);
   const Id access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);

@@ -17,6 +17,8 @@ namespace tensorray {
 /// A part of a dataset: from `start` on, every `stride`-th, `count` in all, along each of its axes.
 struct HyperSlab {
   std::vector<std::uint64_t> start, stride, count;
+
+  bool is_inside(const std::vector<std::uint64_t>& shape) const;
 };
 
 /// An open file. Errors are thrown as std::runtime_error that names the file and the dataset.

@@ -3,7 +3,6 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <numeric>
 #include <sstream>
 
 #include <vtkDataArray.h>
@@ -69,34 +68,19 @@ XdmfValues values_of_xml(const XdmfDocument& document, Element& item) {
   return values;
 }
 
-/// A file's name and a dataset's, in `FILE:DATASET`, and perhaps `|start|stride|count`.
-struct HdfPlace {
-  std::filesystem::path file;
-  std::string dataset;
-  std::vector<Sizes> part;
-};
-
-HdfPlace hdf_place(const XdmfDocument& document, Element& item) {
-  const std::string text = xml_text(item);
-  const std::size_t bar = text.find('|'), colon = text.substr(0, bar).rfind(":/");
-  if (colon == std::string::npos) fail_item(document, "names no dataset of an HDF5 file: '" + escaped(text) + "'");
-  HdfPlace place{document.path().parent_path() / text.substr(0, colon),
-                 text.substr(colon + 1, std::min(bar, text.size()) - colon - 1),
-                 {}};
-  std::istringstream stream(bar == std::string::npos ? "" : text.substr(bar + 1));
-  for (std::string numbers; std::getline(stream, numbers, '|');) place.part.push_back(integers_in(numbers));
-  return place;
-}
-
+/// The text has a file's name and a dataset's, `FILE:DATASET`, and perhaps `|start|stride|count`.
 XdmfValues values_of_hdf(const XdmfDocument& document, Element& item, const HyperSlab* slab) {
-  const HdfPlace place = hdf_place(document, item);
-  const Hdf5File file(place.file);
-  if (slab) return {file.read(place.dataset, *slab), slab->count};
-  if (place.part.size() >= 3) {
-    const HyperSlab part{place.part[0], place.part[1], place.part[2]};
-    return {file.read(place.dataset, part), part.count};
-  }
-  return {file.read(place.dataset), file.shape(place.dataset)};
+  const std::string text = xml_text(item);
+  const std::size_t bar = std::min(text.find('|'), text.size()), colon = text.substr(0, bar).rfind(":/");
+  if (colon == std::string::npos) fail_item(document, "names no dataset of an HDF5 file: '" + escaped(text) + "'");
+  const Hdf5File file(document.path().parent_path() / text.substr(0, colon));
+  const std::string dataset = text.substr(colon + 1, bar - colon - 1);
+  if (slab) return {file.read(dataset, *slab), slab->count};
+  std::istringstream stream(text.substr(bar));
+  std::vector<Sizes> part;  // The first one is empty.
+  for (std::string numbers; std::getline(stream, numbers, '|');) part.push_back(integers_in(numbers));
+  if (part.size() > 3) return {file.read(dataset, {part[1], part[2], part[3]}), part[3]};
+  return {file.read(dataset), file.shape(dataset)};
 }
 
 template <class Number>
@@ -148,12 +132,7 @@ std::vector<Element*> items_in(const XdmfDocument& document, Element& item, std:
 
 XdmfValues part_of(const XdmfDocument& document, const XdmfValues& whole, const HyperSlab& slab) {
   const std::size_t rank = whole.shape.size();
-  for (std::size_t axis = 0; axis < rank; ++axis) {
-    const std::uint64_t extent = whole.shape[axis];
-    const std::uint64_t fitting =  // Not by multiplying, which overflows for hostile numbers.
-        slab.start[axis] < extent ? (extent - 1 - slab.start[axis]) / slab.stride[axis] + 1 : 0;
-    if (slab.count[axis] > fitting) fail_item(document, "is a HyperSlab beyond what it is of");
-  }
+  if (!slab.is_inside(whole.shape)) fail_item(document, "is a HyperSlab beyond what it is of");
   XdmfValues part{Array::Take(whole.numbers->NewInstance()), slab.count};
   part.numbers->SetNumberOfTuples(static_cast<vtkIdType>(product(slab.count)));
   Sizes at(rank, 0);
@@ -173,13 +152,12 @@ XdmfValues values_of_slab(const XdmfDocument& document, Element& item, int depth
   const XdmfValues numbers = values_of(document, *items[0], depth + 1);
   const auto rank = static_cast<std::size_t>(numbers.numbers->GetNumberOfTuples()) / 3;
   HyperSlab slab;
-  for (Sizes* list : {&slab.start, &slab.stride, &slab.count})
-    for (std::size_t i = 0; i < rank; ++i) {
-      const auto index = static_cast<vtkIdType>((list == &slab.start ? 0 : list == &slab.stride ? 1 : 2) * rank + i);
-      const double number = numbers.numbers->GetComponent(index, 0);
-      if (!(number >= (list == &slab.stride ? 1 : 0) && number < 1e15)) fail_item(document, "is a damaged HyperSlab");
-      list->push_back(static_cast<std::uint64_t>(number));
-    }
+  Sizes* const lists[] = {&slab.start, &slab.stride, &slab.count};
+  for (std::size_t i = 0; i < 3 * rank; ++i) {
+    const double number = numbers.numbers->GetComponent(static_cast<vtkIdType>(i), 0);
+    if (!(number >= (i / rank == 1 ? 1 : 0) && number < 1e15)) fail_item(document, "is a damaged HyperSlab");
+    lists[i / rank]->push_back(static_cast<std::uint64_t>(number));
+  }
   if (lower_case(xml_attribute(*items[1], {"Format"})) == "hdf" && xml_attribute(*items[1], {"Reference"}).empty())
     return values_of_hdf(document, *items[1], &slab);
   const XdmfValues whole = values_of(document, *items[1], depth + 1);

@@ -9,8 +9,6 @@
 #include <string>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "tools/import/lattice_files/lattice_files.h"

@@ -128,7 +128,7 @@ Lattice open_npy(const std::filesystem::path& path) {
   if (components == 9) lattice.order = TensorOrder::full;
   const std::int64_t n = lattice.components, x = lattice.size.x(), y = lattice.size.y(), z = lattice.size.z();
   RawVoxels voxels;
-  voxels.type = {NumberType::Kind::real, header.number_bytes};
+  voxels.type = number_type(path, fmt::format("float{}", 8 * header.number_bytes), "");
   voxels.order = header.order;
   voxels.strides = {n, n * x, n * x * y, 1};
   if (header.fortran) voxels.strides = {z * y, z, 1, z * y * x};

@@ -8,7 +8,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -176,19 +175,17 @@ Matrix3d frame_of(const Nrrd& nrrd, const std::filesystem::path& path) {
   return to_ras(nrrd).asDiagonal() * frame;
 }
 
-RawVoxels voxels_of(NrrdPointer nrrd, const Axes& axes) {
+RawVoxels voxels_of(NrrdPointer nrrd, const Axes& axes, const std::filesystem::path& path) {
   std::array<std::int64_t, 4> strides{};  // Of the axes of the file.
   std::int64_t stride = 1;
   for (std::size_t axis = 0; axis < 4; ++axis) {
     strides[axis] = stride;
     stride *= static_cast<std::int64_t>(nrrd->axis[axis].size);
   }
-  using Kind = NumberType::Kind;
+  const char* const kind = !nrrdTypeIsIntegral[nrrd->type] ? "float" : nrrdTypeIsUnsigned[nrrd->type] ? "uint" : "int";
+  const std::string type = fmt::format("{}{}", kind, 8 * nrrdElementSize(nrrd.get()));
   RawVoxels voxels;
-  voxels.type = {!nrrdTypeIsIntegral[nrrd->type]  ? Kind::real
-                 : nrrdTypeIsUnsigned[nrrd->type] ? Kind::unsigned_integer
-                                                  : Kind::signed_integer,
-                 static_cast<int>(nrrdElementSize(nrrd.get()))};
+  voxels.type = number_type(path, type, type);
   voxels.strides = {strides[axes.space[0]], strides[axes.space[1]], strides[axes.space[2]], strides[axes.component]};
   const std::shared_ptr<Nrrd> owner = std::move(nrrd);
   voxels.bytes = {owner, static_cast<const char*>(owner->data)};
@@ -214,7 +211,7 @@ Lattice open_nrrd(const std::filesystem::path& path) {
     lattice.frame_note =
         "has no measurement frame: the axes of its components are taken as those of its space; --frame says otherwise";
   lattice.zero_is_background = true;
-  lattice.read_slice = slices_of(voxels_of(std::move(nrrd), axes), lattice.size, lattice.components);
+  lattice.read_slice = slices_of(voxels_of(std::move(nrrd), axes, path), lattice.size, lattice.components);
   return lattice;
 }
 

@@ -80,21 +80,11 @@ std::shared_ptr<const char> map_bytes(const std::filesystem::path& path, std::ui
   return {static_cast<const char*>(mapping.pages) + (offset - begin), mapping};
 }
 
-using NumberOf = double (*)(const char*, ByteOrder);
-
-template <class Real, class Signed, class Unsigned>
-NumberOf reader_of(NumberType::Kind kind) {
-  if (kind == NumberType::Kind::real) return number<Real>;
-  return kind == NumberType::Kind::signed_integer ? number<Signed> : number<Unsigned>;
-}
-
-NumberOf reader_of(const NumberType& type) {
-  if (type.bytes == 1)
-    return type.kind == NumberType::Kind::signed_integer ? number<std::int8_t> : number<std::uint8_t>;
-  if (type.bytes == 2) return reader_of<Eigen::half, std::int16_t, std::uint16_t>(type.kind);
-  if (type.bytes == 4) return reader_of<float, std::int32_t, std::uint32_t>(type.kind);
-  return reader_of<double, std::int64_t, std::uint64_t>(type.kind);
-}
+const NumberType number_types[] = {
+    {"int8", 1, number<std::int8_t>},     {"uint8", 1, number<std::uint8_t>},   {"int16", 2, number<std::int16_t>},
+    {"uint16", 2, number<std::uint16_t>}, {"int32", 4, number<std::int32_t>},   {"uint32", 4, number<std::uint32_t>},
+    {"int64", 8, number<std::int64_t>},   {"uint64", 8, number<std::uint64_t>}, {"float16", 2, number<Eigen::half>},
+    {"float32", 4, number<float>},        {"float64", 8, number<double>}};
 
 }  // namespace
 
@@ -111,13 +101,8 @@ void require_invertible(const std::filesystem::path& path, const Eigen::Affine3d
 }
 
 NumberType number_type(const std::filesystem::path& path, const std::string& name, const std::string& shown) {
-  using Kind = NumberType::Kind;
-  const std::pair<const char*, Kind> kinds[] = {
-      {"int", Kind::signed_integer}, {"uint", Kind::unsigned_integer}, {"float", Kind::real}};
-  for (const auto& [word, kind] : kinds)
-    for (const int bytes : {1, 2, 4, 8})
-      if (lower_case(name) == word + std::to_string(8 * bytes) && !(kind == Kind::real && bytes == 1))
-        return {kind, bytes};
+  for (const NumberType& type : number_types)
+    if (lower_case(name) == type.name) return type;
   fail(path, "its numbers are " + escaped(shown) + ", not integers or reals");
 }
 
@@ -196,9 +181,8 @@ std::shared_ptr<const char> read_numbers(const std::filesystem::path& path, cons
 }
 
 std::function<void(int z, double* values)> slices_of(RawVoxels voxels, const Eigen::Vector3i& size, int components) {
-  const NumberOf number_of = reader_of(voxels.type);
   const auto held = std::make_shared<const RawVoxels>(std::move(voxels));
-  return [held, number_of, size, components](int z, double* values) {
+  return [held, size, components](int z, double* values) {
     const auto& [x_stride, y_stride, z_stride, component_stride] = held->strides;
     for (int y = 0; y < size.y(); ++y)
       for (int x = 0; x < size.x(); ++x)
@@ -206,8 +190,8 @@ std::function<void(int z, double* values)> slices_of(RawVoxels voxels, const Eig
           const int component = held->by_columns ? c % 3 * 3 + c / 3 : c;
           const std::int64_t index =
               held->first + x * x_stride + y * y_stride + z * z_stride + component * component_stride;
-          *values++ =
-              held->slope * number_of(held->bytes.get() + index * held->type.bytes, held->order) + held->intercept;
+          const char* const bytes = held->bytes.get() + index * held->type.bytes;
+          *values++ = held->slope * held->type.read(bytes, held->order) + held->intercept;
         }
     // They need not stay in memory: the system has the file.
     if (const auto* const mapping = std::get_deleter<Mapping>(held->bytes))

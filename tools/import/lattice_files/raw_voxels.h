@@ -27,9 +27,9 @@ void require_invertible(const std::filesystem::path& path, const Eigen::Affine3d
                         const std::string& is_what);
 
 struct NumberType {
-  enum class Kind { signed_integer, unsigned_integer, real };
-  Kind kind = Kind::real;
-  int bytes = 4;  ///< 1 (not real), 2, 4 or 8.
+  const char* name = nullptr;
+  int bytes = 0;
+  double (*read)(const char* bytes, ByteOrder order) = nullptr;
 };
 
 /// The type with a name as in "Float32", "uint8", without a byte order. @throw std::runtime_error naming the path, and

@@ -138,63 +138,54 @@ std::map<std::string, SameArrays> arrays_of(const DataSets& pieces, vtkDataObjec
   return named;
 }
 
-/// The type in which all of them can be one array. NaN stands for what is missing.
-int common_type(const SameArrays& arrays) {
-  std::set<int> types;
-  for (const auto& array : arrays) types.insert(array ? array->GetDataType() : VTK_VOID);
-  const bool is_missing = types.erase(VTK_VOID) > 0;
-  const bool is_real = *types.begin() == VTK_FLOAT || *types.begin() == VTK_DOUBLE;
-  return types.size() == 1 && (is_real || !is_missing) ? *types.begin() : VTK_DOUBLE;
-}
+/// What arrays of one name have in common.
+struct CommonArray {
+  int type = VTK_DOUBLE;         ///< In which all of them can be one. NaN stands for what is missing.
+  vtkDataArray* like = nullptr;  ///< The first one with names of its components, or else the first one.
+  bool names_differ = false;     ///< Some name their components, but not all alike.
+};
 
-/// Whether arrays name their components, but not all alike.
-bool names_differ(const SameArrays& arrays) {
-  std::set<std::vector<std::string>> all;
+CommonArray common_array(const SameArrays& arrays) {
+  CommonArray common;
+  std::set<int> types;
+  std::set<std::vector<std::string>> all_names;
   for (const auto& array : arrays) {
-    if (!array || !array->HasAComponentName()) continue;
+    types.insert(array ? array->GetDataType() : VTK_VOID);
+    if (!array) continue;
+    if (!common.like || (array->HasAComponentName() && !common.like->HasAComponentName())) common.like = array;
     std::vector<std::string> names;
     for (int i = 0; i < array->GetNumberOfComponents(); ++i) names.push_back(component_name(*array, i));
-    all.insert(names);
+    if (array->HasAComponentName()) all_names.insert(names);
   }
-  return all.size() > 1;
+  const bool is_missing = types.erase(VTK_VOID) > 0;
+  const bool is_real = *types.begin() == VTK_FLOAT || *types.begin() == VTK_DOUBLE;
+  if (types.size() == 1 && (is_real || !is_missing)) common.type = *types.begin();
+  common.names_differ = all_names.size() > 1;
+  return common;
 }
 
-/// The first array with names of its components, or else the first one.
-vtkDataArray& first_named(const SameArrays& arrays) {
-  vtkDataArray* first = nullptr;
-  for (const auto& array : arrays) {
-    if (array && array->HasAComponentName()) return *array;
-    if (!first) first = array;
-  }
-  return *first;
-}
-
-vtkSmartPointer<vtkDataArray> missing_array(vtkDataArray& like, int type, vtkIdType count) {
-  auto filled = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(type));
-  filled->SetName(like.GetName());
-  filled->SetNumberOfComponents(like.GetNumberOfComponents());
-  filled->SetNumberOfTuples(count);
-  filled->Fill(std::numeric_limits<double>::quiet_NaN());
-  return filled;
+vtkSmartPointer<vtkDataArray> new_array(int type) {
+  return vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(type));
 }
 
 /// Makes arrays of one name alike, and adds those that are missing: vtkAppendFilter drops arrays that some of its
 /// inputs lack or have as numbers of another type, and joins components by their numbers.
 void unify_arrays(const DataSets& pieces, vtkDataObject::AttributeTypes type) {
   for (const auto& [name, arrays] : arrays_of(pieces, type)) {
-    const int number_type = common_type(arrays);
-    const bool sorts = names_differ(arrays);
-    vtkDataArray& like = first_named(arrays);
+    const CommonArray common = common_array(arrays);
     for (std::size_t k = 0; k < pieces.size(); ++k) {
       vtkSmartPointer<vtkDataArray> array = arrays[k];
-      if (!array) array = missing_array(like, number_type, pieces[k]->GetNumberOfElements(type));
-      if (sorts) array = sorted_by_names(*array);
-      if (array->GetDataType() != number_type) {
-        const auto converted = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(number_type));
-        converted->DeepCopy(array);
-        array = converted;
+      if (!array) {
+        array = new_array(common.type);
+        array->SetName(name.c_str());
+        array->SetNumberOfComponents(common.like->GetNumberOfComponents());
+        array->SetNumberOfTuples(pieces[k]->GetNumberOfElements(type));
+        array->Fill(std::numeric_limits<double>::quiet_NaN());
       }
-      pieces[k]->GetAttributes(type)->AddArray(array);
+      if (common.names_differ) array = sorted_by_names(*array);
+      const auto converted = new_array(common.type);
+      if (array->GetDataType() != common.type) converted->DeepCopy(array);
+      pieces[k]->GetAttributes(type)->AddArray(array->GetDataType() != common.type ? converted : array);
     }
   }
 }

@@ -29,7 +29,6 @@ namespace tensorray {
 namespace {
 
 using Path = std::filesystem::path;
-
 using FilesByTime = std::map<double, std::vector<Path>>;
 
 double time_of(vtkXMLDataElement& element, const Path& path) {
@@ -60,18 +59,16 @@ void collect(vtkXMLDataElement& element, const Path& path, FilesByTime& steps) {
 std::vector<std::vector<Path>> series_steps(const Path& path) {
   std::ifstream file(path, std::ios::binary);
   const auto json = nlohmann::json::parse(file, nullptr, false);
-  std::vector<std::pair<double, Path>> files;
+  std::multimap<double, Path> files;
   try {
     for (const auto& each : json.at("files"))
-      files.emplace_back(each.value("time", static_cast<double>(files.size())),
-                         path.parent_path() / each.at("name").get<std::string>());
+      files.emplace(each.value("time", static_cast<double>(files.size())), each.at("name").get<std::string>());
   } catch (const nlohmann::json::exception&) {
     files.clear();
   }
   if (files.empty()) fail(path, "is damaged, or names no files; write it again");
-  std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<std::vector<Path>> steps;
-  for (const auto& [time, name] : files) steps.push_back({name.lexically_normal()});
+  for (const auto& [time, name] : files) steps.push_back({(path.parent_path() / name).lexically_normal()});
   return steps;
 }
 
