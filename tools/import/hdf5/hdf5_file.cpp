@@ -46,13 +46,8 @@ std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
   }
 }
 
-/// @param file  -1: there is no such attribute.
-Id open_attribute(hid_t file, const std::string& object, const std::string& attribute) {
-  return {file < 0 ? -1 : H5Aopen_by_name(file, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose};
-}
-
-/// Whether all numbers are the dataset's fill value.
-bool is_only_fill(hid_t data, hid_t memory_type, vtkDataArray& array) {
+/// Whether HDF5 made up all numbers of a part: they are the fill value, and its first chunk was not written.
+bool is_made_up(hid_t data, hid_t memory_type, vtkDataArray& array, const HyperSlab& part) {
   const Id creation(H5Dget_create_plist(data), H5Pclose);
   const auto size = static_cast<std::size_t>(array.GetDataTypeSize());
   std::string fill(size, '\0');
@@ -60,23 +55,17 @@ bool is_only_fill(hid_t data, hid_t memory_type, vtkDataArray& array) {
   const auto* const bytes = static_cast<const char*>(array.GetVoidPointer(0));
   for (vtkIdType i = 0; i < array.GetNumberOfTuples(); ++i)
     if (std::memcmp(bytes + static_cast<std::size_t>(i) * size, fill.data(), size) != 0) return false;
-  return true;
-}
-
-/// Whether a part was written: its first chunk, if the dataset is in chunks.
-bool is_written(hid_t data, const HyperSlab& part) {
   H5D_space_status_t status = H5D_SPACE_STATUS_ALLOCATED;
   H5Dget_space_status(data, &status);
-  if (status != H5D_SPACE_STATUS_PART_ALLOCATED) return status == H5D_SPACE_STATUS_ALLOCATED;
-  const Id creation(H5Dget_create_plist(data), H5Pclose);
+  if (status != H5D_SPACE_STATUS_PART_ALLOCATED) return status != H5D_SPACE_STATUS_ALLOCATED;
   const std::size_t rank = part.start.size();
   std::vector<hsize_t> chunk(rank, 1), corner(rank);
   H5Pget_chunk(creation, static_cast<int>(rank), chunk.data());
   for (std::size_t i = 0; i < rank; ++i) corner[i] = part.start[i] / chunk[i] * chunk[i];
   unsigned filters = 0;
   haddr_t address = HADDR_UNDEF;
-  hsize_t size = 0;
-  return H5Dget_chunk_info_by_coord(data, corner.data(), &filters, &address, &size) < 0 || address != HADDR_UNDEF;
+  hsize_t stored = 0;
+  return H5Dget_chunk_info_by_coord(data, corner.data(), &filters, &address, &stored) >= 0 && address == HADDR_UNDEF;
 }
 
 }  // namespace
@@ -235,13 +224,13 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const H
   if (H5Dread(data, memory_type, memory, space, H5P_DEFAULT, array->GetVoidPointer(0)) < 0)
     fail("its dataset " + dataset +
          " cannot be read: damaged, cut off, or compressed by a filter that is not installed");
-  if (is_only_fill(data, memory_type, *array) && !is_written(data, part))
+  if (is_made_up(data, memory_type, *array, part))
     fail("its dataset " + dataset + " was announced, and not written there; write it again");
   return array;
 }
 
 std::vector<double> Hdf5File::numbers(const std::string& object, const std::string& attribute) const {
-  const Id id = open_attribute(has_attribute(object, attribute) ? hid_t{file_->id} : -1, object, attribute);
+  const Id id(H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
   const Id space(id < 0 ? -1 : H5Aget_space(id), H5Sclose);
   const hssize_t count = space < 0 ? 0 : H5Sget_simple_extent_npoints(space);
   std::vector<double> values(static_cast<std::size_t>(std::clamp<hssize_t>(count, 0, 64)));
@@ -251,7 +240,7 @@ std::vector<double> Hdf5File::numbers(const std::string& object, const std::stri
 }
 
 std::string Hdf5File::text(const std::string& object, const std::string& attribute) const {
-  const Id id = open_attribute(has_attribute(object, attribute) ? hid_t{file_->id} : -1, object, attribute);
+  const Id id(H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
   const Id type(id < 0 ? -1 : H5Aget_type(id), H5Tclose);
   const bool is_text = type >= 0 && H5Tget_class(type) == H5T_STRING;
   if (is_text && H5Tis_variable_str(type) > 0) {

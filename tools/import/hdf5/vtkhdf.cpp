@@ -23,7 +23,7 @@
 #include "base/text/text.h"
 #include "tools/import/hdf5/hdf5_file.h"
 #include "tools/import/hdf5/hdf5_meshes.h"
-#include "tools/import/vtk/polyhedra.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
 namespace {

@@ -1,5 +1,3 @@
-#include "tools/import/vtk/polyhedra.h"
-
 #include <algorithm>
 
 #include <vtkDataArray.h>
@@ -11,6 +9,7 @@
 #include <vtkXMLUnstructuredGridReader.h>
 
 #include "base/errors.h"
+#include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
 namespace {

@@ -1,30 +1,36 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include <Eigen/Core>
 #include <vtkAppendFilter.h>
+#include <vtkBoundingBox.h>
 #include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
+#include <vtkGenericCell.h>
 #include <vtkIdList.h>
 #include <vtkIntArray.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkPoints.h>
 #include <vtkSmartPointer.h>
+#include <vtkStaticCellLocator.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
 #include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/mesh_tensors.h"
-#include "tools/import/vtk/overlaps.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray {
@@ -102,6 +108,36 @@ vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
   grid->RemoveGhostCells();  // Those that are marked as copies.
   grid->GetCellData()->RemoveArray(vtkDataSetAttributes::GhostArrayName());
   return grid;
+}
+
+/// The mean point of a cell, and its dimensions.
+struct CellCentre {
+  Eigen::Vector3d position;
+  int dimensions;
+};
+
+CellCentre centre_of(vtkDataSet& set, vtkIdType id) {
+  vtkNew<vtkGenericCell> cell;
+  set.GetCell(id, cell);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (vtkIdType i = 0; i < cell->GetNumberOfPoints(); ++i) sum += Eigen::Vector3d(cell->GetPoints()->GetPoint(i));
+  return {sum / static_cast<double>(std::max<vtkIdType>(1, cell->GetNumberOfPoints())), cell->GetCellDimension()};
+}
+
+/// Whether a cell of a data set, which must outlive this, is at a centre, and has as many dimensions.
+using CellFinder = std::function<bool(const CellCentre&)>;
+
+CellFinder cell_finder(vtkDataSet& set) {
+  const auto locator = vtkSmartPointer<vtkStaticCellLocator>::New();
+  locator->SetDataSet(&set);
+  locator->BuildLocator();
+  std::vector<double> weights(static_cast<std::size_t>(std::max(32, set.GetMaxCellSize())));
+  const double squared_tolerance = 1e-12 * set.GetLength() * set.GetLength();
+  return [=, cell = vtkSmartPointer<vtkGenericCell>::New()](const CellCentre& centre) mutable {
+    Eigen::Vector3d position = centre.position, parametric;
+    return locator->FindCell(position.data(), squared_tolerance, cell, parametric.data(), weights.data()) >= 0 &&
+           cell->GetCellDimension() == centre.dimensions;
+  };
 }
 
 /// Hides copies of cells where the piece has the cells themselves, whose values are never stale.
@@ -243,6 +279,51 @@ vtkSmartPointer<vtkDataSet> merged_layer(const DataSets& pieces, bool merges_poi
   return all;
 }
 
+struct Sampled {
+  vtkSmartPointer<vtkDataSet> set;
+  std::vector<CellCentre> centres;  ///< Of some cells of the highest dimensions.
+  CellFinder has;                   ///< Made when it is needed.
+};
+
+Sampled sampled(vtkDataSet& set) {
+  constexpr vtkIdType most = 4096;
+  Sampled result{&set, {}, nullptr};
+  for (vtkIdType id = 0; id < set.GetNumberOfCells(); id += (set.GetNumberOfCells() + most - 1) / most) {
+    const CellCentre centre = centre_of(set, id);
+    if (!result.centres.empty() && centre.dimensions > result.centres[0].dimensions) result.centres.clear();
+    if (result.centres.empty() || centre.dimensions == result.centres[0].dimensions) result.centres.push_back(centre);
+  }
+  return result;
+}
+
+/// Whether a cell of `a` is at the centre of one of `b`.
+bool has_some(Sampled& a, const Sampled& b) {
+  const vtkBoundingBox box(a.set->GetBounds());
+  return std::any_of(b.centres.begin(), b.centres.end(), [&](const CellCentre& centre) {
+    if (!box.ContainsPoint(centre.position.data())) return false;
+    if (!a.has) a.has = cell_finder(*a.set);
+    return a.has(centre);
+  });
+}
+
+/// Divides data sets into layers, so that none overlaps another one of its layer. Tries up to 4096 cells of each set
+/// where its box intersects that of another one. Faces in common are no overlap.
+std::vector<DataSets> layers_of(const DataSets& sets) {
+  std::vector<std::vector<Sampled>> layers;
+  std::vector<DataSets> result;
+  for (vtkDataSet* const set : sets) {
+    Sampled next = sampled(*set);
+    const auto overlaps = [&](Sampled& other) { return has_some(other, next) || has_some(next, other); };
+    std::size_t layer = 0;
+    while (layer < layers.size() && std::any_of(layers[layer].begin(), layers[layer].end(), overlaps)) ++layer;
+    layers.resize(std::max(layers.size(), layer + 1));
+    result.resize(layers.size());
+    layers[layer].push_back(std::move(next));
+    result[layer].emplace_back(set);
+  }
+  return result;
+}
+
 /// One grid of layers, which share no points, so that none takes values of another, and which its cells name.
 vtkSmartPointer<vtkDataSet> stacked(const DataSets& layers) {
   for (std::size_t i = 0; i < layers.size(); ++i) {
@@ -295,14 +376,8 @@ vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& given, bool merges_poin
   for (vtkDataSet* const piece : given) sets.push_back(used_part(*piece));
   unify_arrays(sets, vtkDataObject::POINT);
   unify_arrays(sets, vtkDataObject::CELL);
-  const std::vector<int> layers = overlapping_layers(sets);
   DataSets merged;
-  for (int layer = 0; layer <= *std::max_element(layers.begin(), layers.end()); ++layer) {
-    DataSets of_layer;
-    for (std::size_t k = 0; k < sets.size(); ++k)
-      if (layers[k] == layer) of_layer.push_back(sets[k]);
-    merged.push_back(merged_layer(of_layer, merges_points));
-  }
+  for (const DataSets& layer : layers_of(sets)) merged.push_back(merged_layer(layer, merges_points));
   return merged.size() == 1 ? merged.front() : stacked(merged);
 }
 

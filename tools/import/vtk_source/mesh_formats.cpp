@@ -31,7 +31,6 @@
 #include "tools/import/cases/openfoam_walls.h"
 #include "tools/import/hdf5/hdf5_meshes.h"
 #include "tools/import/meshes/cell_graph.h"
-#include "tools/import/vtk/polyhedra.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk_formats/array_names.h"
 #include "tools/import/vtk_formats/vtk_tags.h"
