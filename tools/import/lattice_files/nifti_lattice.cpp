@@ -167,23 +167,17 @@ Lattice open_nifti(const std::filesystem::path& given) {
     lattice.notes.push_back(
         "states no orientation (the codes of sform and qform are 0): its first axis is taken to run from right to "
         "left, as FSL does; set the sform if it does not");
-  if (lattice.components != 6)  // Of six, --order tells the axes.
-    lattice.frame_note =
-        "does not say the axes of its components: taken as those of the scanner (RAS); --frame says otherwise";
-  if (image->intent_code == NIFTI_INTENT_SYMMATRIX && lattice.components == 6)
-    lattice.order = TensorOrder::lower_triangle;
-  if (lattice.order)
-    lattice.frame_note =
-        "does not say the axes of its symmetric matrices: taken as those of the voxels, as ANTs and dipy write them; "
-        "--frame says otherwise";
   RawVoxels voxels = voxels_of(*image, path, lattice);
   voxels.by_columns = has_matrices(*image);
-  if (voxels.by_columns) {
-    lattice.frame = axes_of(ComponentFrame::voxels, lattice.to_world.linear());
-    lattice.frame_note =
-        "does not say the axes of its 3 x 3 matrices: taken as those of the voxels, as dipy writes them; --frame says "
-        "otherwise";
-  }
+  if (voxels.by_columns) lattice.frame = axes_of(ComponentFrame::voxels, lattice.to_world.linear());
+  if (image->intent_code == NIFTI_INTENT_SYMMATRIX && lattice.components == 6)
+    lattice.order = TensorOrder::lower_triangle;
+  const char* const axes = lattice.order
+                               ? "symmetric matrices: taken as those of the voxels, as ANTs and dipy write them"
+                           : voxels.by_columns ? "3 x 3 matrices: taken as those of the voxels, as dipy writes them"
+                           : lattice.components != 6 ? "components: taken as those of the scanner (RAS)"
+                                                     : nullptr;  // Of six, --order tells the axes.
+  if (axes) lattice.frame_note = fmt::format("does not say the axes of its {}; --frame says otherwise", axes);
   lattice.read_slice = slices_of(std::move(voxels), lattice.size, lattice.components);
   return lattice;
 }

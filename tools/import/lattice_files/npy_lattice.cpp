@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,20 +61,17 @@ std::string value_of(const std::string& dictionary, const std::string& key, cons
 std::vector<std::size_t> shape_of(const std::string& text, const std::filesystem::path& path) {
   const std::size_t end = text.find(')');
   if (text[0] != '(' || end == std::string::npos) fail(path, "its .npy header is damaged: shape");
+  std::string list = text.substr(1, end - 1);
+  std::replace(list.begin(), list.end(), ',', ' ');
+  std::istringstream stream(list);
   std::vector<std::size_t> shape;
-  for (std::size_t i = 1; i < end;) {
-    const std::size_t comma = std::min(text.find(',', i), end);
-    std::size_t extent = 0;
-    const auto [last, error] =
-        std::from_chars(text.data() + text.find_first_not_of(' ', i), text.data() + comma, extent);
-    const bool none = i > 1 && comma == end && text.find_first_not_of(' ', i) == end;  // "(3,)"
-    if (none) break;
-    if (error != std::errc() || last != text.data() + comma || extent < 1 ||
-        extent > static_cast<std::size_t>(std::numeric_limits<int>::max()))
-      fail(path, "its .npy header is damaged, or the array is empty: shape " + escaped(text.substr(0, end + 1)));
-    shape.push_back(extent);
-    i = comma + 1;
+  bool is_possible = true;
+  for (double extent = 0; is_possible && stream >> extent;) {
+    is_possible = extent >= 1 && extent <= std::numeric_limits<int>::max() && extent == std::floor(extent);
+    if (is_possible) shape.push_back(static_cast<std::size_t>(extent));
   }
+  if (!is_possible || !stream.eof())
+    fail(path, "its .npy header is damaged, or the array is empty: shape " + escaped(text.substr(0, end + 1)));
   return shape;
 }
 

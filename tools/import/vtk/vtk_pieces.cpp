@@ -219,9 +219,12 @@ void unify_arrays(const DataSets& pieces, vtkDataObject::AttributeTypes type) {
         array->Fill(std::numeric_limits<double>::quiet_NaN());
       }
       if (common.names_differ) array = sorted_by_names(*array);
-      const auto converted = new_array(common.type);
-      if (array->GetDataType() != common.type) converted->DeepCopy(array);
-      pieces[k]->GetAttributes(type)->AddArray(array->GetDataType() != common.type ? converted : array);
+      if (array->GetDataType() != common.type) {
+        const auto converted = new_array(common.type);
+        converted->DeepCopy(array);
+        array = converted;
+      }
+      pieces[k]->GetAttributes(type)->AddArray(array);
     }
   }
 }
