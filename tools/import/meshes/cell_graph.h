@@ -5,10 +5,8 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-#include <vtkType.h>
+#include "tools/import/meshes/mesh_faces.h"
 
-class vtkDataSet;
 class vtkDoubleArray;
 
 namespace tensorray {
@@ -17,7 +15,7 @@ namespace tensorray {
 struct Wall {
   enum class Kind { value, zero_gradient, slip };  ///< Slip: no flow through it, no gradient of the flow along it.
 
-  Eigen::Vector3d centre, normal;  ///< As face_measure (below); the normal has unit length and points out of the mesh.
+  Eigen::Vector3d centre, normal;  ///< As face_measure; the normal has unit length and points out of the mesh.
   Kind kind = Kind::value;
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
 };
@@ -25,23 +23,13 @@ struct Wall {
 /// Keeps the walls of the array of cells called `array` with the mesh, as field data.
 void add_walls(vtkDataSet& mesh, const std::string& array, const std::vector<Wall>& walls);
 
-/// The centre and the area, along the normal, of a polygon that need not be flat: the sums of the triangles between its
-/// edges and the mean of its corners, as solvers of finite volumes take them.
-struct FaceMeasure {
-  Eigen::Vector3d centre, area;
-};
-FaceMeasure face_measure(const Eigen::Matrix3Xd& corners);
-
 struct CellGraph {
   std::vector<Eigen::Vector3d> centres;            ///< The centroids of the cells.
   std::vector<char> used;                          ///< Whether MeshCell loads a cell and its vector is finite.
   std::vector<std::vector<vtkIdType>> neighbours;  ///< Across faces, ascending.
   std::vector<std::vector<Wall>> walls;            ///< Of the cells.
-
-  /// The cells at point p, ascending: cells[first[p]] to cells[first[p + 1] - 1], if p = same[p]. The point same[q]
-  /// represents all that are where q is.
-  std::vector<vtkIdType> same, cells;
-  std::vector<std::size_t> first;
+  MeshPoints points;
+  std::vector<std::vector<vtkIdType>> cells_at;  ///< The used cells that have a point, of those that represent others.
 };
 
 /// Neighbours have a face with the same corners, or faces that lie on each other: at hanging nodes, and where blocks

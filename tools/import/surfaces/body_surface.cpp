@@ -16,8 +16,8 @@
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 
+#include "tools/import/meshes/mesh_faces.h"
 #include "tools/import/meshes/mesh_tensors.h"
-#include "tools/import/surfaces/mesh_faces.h"
 #include "tools/import/surfaces/triangle_shells.h"
 
 namespace tensorray {
@@ -248,15 +248,15 @@ class Tessellation {
   vtkIdType loaded_ = -1;
 };
 
-/// Whether a cell has finite tensors, as far as there are any.
-IsUsed carries_data(vtkDataSet& mesh) {
+/// Chooses the faces of cells that have finite tensors, as far as there are any.
+ChooseFaces with_data(vtkDataSet& mesh) {
   const double* const of_points = made_tensors(*mesh.GetPointData());
   const double* const of_cells = made_tensors(*mesh.GetCellData());
-  return [=](const MeshCell& cell, vtkIdType id) {
-    if (of_cells && !Tensor(of_cells + 9 * id).allFinite()) return false;
+  return [=](const MeshCell& cell, vtkIdType id, std::vector<CellFace>& faces) {
+    bool is_finite = !of_cells || Tensor(of_cells + 9 * id).allFinite();
     for (int i = 0; of_points && i < cell.points(); ++i)
-      if (!Tensor(of_points + 9 * cell.point(i)).allFinite()) return false;
-    return true;
+      is_finite = is_finite && Tensor(of_points + 9 * cell.point(i)).allFinite();
+    if (!is_finite) faces.clear();
   };
 }
 
@@ -264,7 +264,7 @@ IsUsed carries_data(vtkDataSet& mesh) {
 
 BodySurface body_surface(vtkDataSet& mesh, double tolerance) {
   const MeshPoints points = points_of(mesh);
-  std::vector<CellFace> faces = outer_faces(mesh, points, carries_data(mesh));
+  std::vector<CellFace> faces = outer_faces(mesh, points, with_data(mesh));
   BodySurface surface;
   surface.inner_faces = remove_crossed_faces(faces, points);
   Tessellation tessellation(mesh, points, tolerance);

@@ -17,7 +17,7 @@
 #include "base/geometry/ply_writer.h"
 #include "base/geometry/triangle_mesh.h"
 #include "tools/import/meshes/mesh_cell.h"
-#include "tools/import/surfaces/mesh_faces.h"
+#include "tools/import/meshes/mesh_faces.h"
 
 namespace tensorray {
 namespace {
@@ -99,8 +99,10 @@ FacePlane plane_of(const MeshCell& cell, int index, const MeshPoints& points) {
 TriangleMesh surrounded_surface(vtkDataSet& mesh) {
   const MeshPoints points = points_of(mesh);
   // VTK lists no faces of convex point sets.
-  const std::vector<CellFace> faces = outer_faces(
-      mesh, points, [](const MeshCell& cell, vtkIdType) { return cell.vtk().GetCellType() != VTK_CONVEX_POINT_SET; });
+  const std::vector<CellFace> faces =
+      outer_faces(mesh, points, [](const MeshCell& cell, vtkIdType, std::vector<CellFace>& of_cell) {
+        if (cell.vtk().GetCellType() == VTK_CONVEX_POINT_SET) of_cell.clear();
+      });
   if (faces.empty()) throw std::invalid_argument("the mesh has no three-dimensional cells: it lies around no body");
   const Eigen::Matrix3Xd extreme = extreme_points(mesh, faces, points);
   const double min_depth = 1e-3 * (extreme.rowwise().maxCoeff() - extreme.rowwise().minCoeff()).norm();

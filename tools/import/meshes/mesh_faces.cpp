@@ -1,4 +1,4 @@
-#include "tools/import/surfaces/mesh_faces.h"
+#include "tools/import/meshes/mesh_faces.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -12,6 +12,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
+#include <vtkDoubleArray.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkStaticPointLocator.h>
@@ -137,19 +138,7 @@ void find_faces(const MeshCell& cell, vtkIdType id, const MeshPoints& points, st
   }
 }
 
-/// A face without its corners.
-struct Side {
-  std::uint64_t key;
-  vtkIdType cell;
-  int index;
-  bool turn;  ///< Differs for two faces with the same corners if they look in opposite directions.
-
-  bool operator<(const Side& other) const {
-    return std::tie(key, cell, index) < std::tie(other.key, other.cell, other.index);
-  }
-};
-
-Side side_of(const CellFace& face) {
+CellSide side_of(const CellFace& face) {
   const std::vector<vtkIdType>& c = face.corners;
   const auto lowest = static_cast<std::size_t>(std::min_element(c.begin(), c.end()) - c.begin());
   const bool turn = c[(lowest + 1) % c.size()] < c[(lowest + c.size() - 1) % c.size()];
@@ -169,25 +158,10 @@ void for_each_cell(vtkDataSet& mesh, std::size_t count, const CellAt& cell_at, c
   });
 }
 
-std::vector<Side> sides_of(vtkDataSet& mesh, const MeshPoints& points, const IsUsed& is_used) {
-  tbb::enumerable_thread_specific<std::vector<Side>> parts;
-  for_each_cell(
-      mesh, static_cast<std::size_t>(mesh.GetNumberOfCells()), [](std::size_t i) { return static_cast<vtkIdType>(i); },
-      [&](const MeshCell& cell, vtkIdType id, std::vector<CellFace>& faces, std::size_t) {
-        if (!is_used(cell, id)) return;
-        find_faces(cell, id, points, faces);
-        std::transform(faces.begin(), faces.end(), std::back_inserter(parts.local()), side_of);
-      });
-  std::vector<Side> all;
-  for (const std::vector<Side>& part : parts) all.insert(all.end(), part.begin(), part.end());
-  tbb::parallel_sort(all.begin(), all.end());
-  return all;
-}
-
 /// Those that are left when faces with the same corners that look in opposite directions are removed in pairs.
 /// @param sides  Sorted.
-std::vector<Side> unpaired(const std::vector<Side>& sides) {
-  std::vector<Side> left;
+std::vector<CellSide> unpaired(const std::vector<CellSide>& sides) {
+  std::vector<CellSide> left;
   for (std::size_t i = 0, next = 0; i < sides.size(); i = next) {
     int sum = 0;
     for (next = i; next < sides.size() && sides[next].key == sides[i].key; ++next) sum += sides[next].turn ? 1 : -1;
@@ -196,9 +170,11 @@ std::vector<Side> unpaired(const std::vector<Side>& sides) {
       if (sides[k].turn == (sum > 0)) left.push_back(sides[k]), --rest;
   }
   std::sort(left.begin(), left.end(),
-            [](const Side& a, const Side& b) { return std::tie(a.cell, a.index) < std::tie(b.cell, b.index); });
+            [](const CellSide& a, const CellSide& b) { return std::tie(a.cell, a.index) < std::tie(b.cell, b.index); });
   return left;
 }
+
+Vector3d area_of(const CellFace& face, const MeshPoints& points) { return face_measure(corners_of(face, points)).area; }
 
 /// A quadrilateral between four points: a face, or two triangles.
 struct Quad {
@@ -238,14 +214,12 @@ MeshPoints points_of(vtkDataSet& mesh) {
   const vtkIdType count = mesh.GetNumberOfPoints();
   points.positions.resize(static_cast<std::size_t>(count));
   points.same.resize(static_cast<std::size_t>(count));
+  for (vtkIdType i = 0; i < count; ++i) mesh.GetPoint(i, points.positions[static_cast<std::size_t>(i)].data());
+  vtkNew<vtkDoubleArray> numbers;
+  numbers->SetNumberOfComponents(3);
+  if (count > 0) numbers->SetArray(points.positions.front().data(), 3 * count, 1);
   vtkNew<vtkPoints> positions;
-  positions->SetDataTypeToDouble();
-  positions->SetNumberOfPoints(count);
-  for (vtkIdType i = 0; i < count; ++i) {
-    Vector3d& position = points.positions[static_cast<std::size_t>(i)];
-    mesh.GetPoint(i, position.data());
-    positions->SetPoint(i, position.data());
-  }
+  positions->SetData(numbers);
   vtkNew<vtkPolyData> cloud;
   cloud->SetPoints(positions);
   vtkNew<vtkStaticPointLocator> locator;
@@ -255,25 +229,66 @@ MeshPoints points_of(vtkDataSet& mesh) {
   return points;
 }
 
-Vector3d area_of(const CellFace& face, const MeshPoints& points) {
-  Vector3d area = Vector3d::Zero();
-  const Vector3d& first = points[face.corners[0]];
-  for (std::size_t k = 1; k + 1 < face.corners.size(); ++k)
-    area += 0.5 * (points[face.corners[k]] - first).cross(points[face.corners[k + 1]] - first);
-  return area;
+bool CellSide::operator<(const CellSide& other) const {
+  return std::tie(key, cell, index) < std::tie(other.key, other.cell, other.index);
 }
 
-std::vector<CellFace> outer_faces(vtkDataSet& mesh, const MeshPoints& points, const IsUsed& is_used) {
-  const std::vector<Side> sides = unpaired(sides_of(mesh, points, is_used));
-  std::vector<CellFace> outer(sides.size());
+std::vector<CellSide> sides_of(vtkDataSet& mesh, const MeshPoints& points, const ChooseFaces& choose) {
+  tbb::enumerable_thread_specific<std::vector<CellSide>> parts;
+  for_each_cell(
+      mesh, static_cast<std::size_t>(mesh.GetNumberOfCells()), [](std::size_t i) { return static_cast<vtkIdType>(i); },
+      [&](const MeshCell& cell, vtkIdType id, std::vector<CellFace>& faces, std::size_t) {
+        find_faces(cell, id, points, faces);
+        choose(cell, id, faces);
+        std::transform(faces.begin(), faces.end(), std::back_inserter(parts.local()), side_of);
+      });
+  std::vector<CellSide> all;
+  for (const std::vector<CellSide>& part : parts) all.insert(all.end(), part.begin(), part.end());
+  tbb::parallel_sort(all.begin(), all.end());
+  return all;
+}
+
+std::vector<CellFace> faces_at(vtkDataSet& mesh, const MeshPoints& points, const std::vector<CellSide>& sides) {
+  std::vector<CellFace> found(sides.size());
   for_each_cell(
       mesh, sides.size(), [&](std::size_t i) { return sides[i].cell; },
       [&](const MeshCell& cell, vtkIdType id, std::vector<CellFace>& faces, std::size_t i) {
         find_faces(cell, id, points, faces);
         for (const CellFace& face : faces)
-          if (face.index == sides[i].index) outer[i] = face;
+          if (face.index == sides[i].index) found[i] = face;
       });
-  return outer;
+  return found;
+}
+
+std::vector<CellFace> outer_faces(vtkDataSet& mesh, const MeshPoints& points, const ChooseFaces& choose) {
+  return faces_at(mesh, points, unpaired(sides_of(mesh, points, choose)));
+}
+
+FaceMeasure face_measure(const Eigen::Matrix3Xd& corners) {
+  const Vector3d mean = corners.rowwise().mean();
+  FaceMeasure measure{Vector3d::Zero(), Vector3d::Zero()};
+  Eigen::Matrix3Xd areas(3, corners.cols());
+  const auto next = [&](Eigen::Index i) { return (i + 1) % corners.cols(); };
+  for (Eigen::Index i = 0; i < corners.cols(); ++i) {
+    const Vector3d from = corners.col(i) - mean, to = corners.col(next(i)) - mean;
+    areas.col(i) = 0.5 * from.cross(to);
+    measure.area += areas.col(i);
+  }
+  double sum = 0;
+  for (Eigen::Index i = 0; i < corners.cols(); ++i) {
+    const double area = areas.col(i).dot(measure.area);
+    measure.centre += area * (corners.col(i) + corners.col(next(i)) - 2 * mean) / 3;
+    sum += area;
+  }
+  measure.centre = sum > 0 ? Vector3d(mean + measure.centre / sum) : mean;
+  return measure;
+}
+
+Eigen::Matrix3Xd corners_of(const CellFace& face, const MeshPoints& points) {
+  Eigen::Matrix3Xd corners(3, static_cast<Eigen::Index>(face.corners.size()));
+  for (std::size_t k = 0; k < face.corners.size(); ++k)
+    corners.col(static_cast<Eigen::Index>(k)) = points[face.corners[k]];
+  return corners;
 }
 
 std::size_t remove_crossed_faces(std::vector<CellFace>& faces, const MeshPoints& points) {
