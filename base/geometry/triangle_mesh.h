@@ -3,6 +3,7 @@
 /// Triangles: the one type that fields, importers and the renderer share.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -30,5 +31,9 @@ struct TriangleMesh {
     return sum / 6;
   }
 };
+
+/// The number of edges along which more triangles run one way than the other; each counts once for each triangle that
+/// is missing. A closed mesh has none.
+std::size_t open_edges(const TriangleMesh& mesh);
 
 }  // namespace tensorray

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -99,23 +98,6 @@ MeshWithNormals read_joined(const std::filesystem::path& path, bool normals) {
   MeshWithNormals mesh = without_repeats(raw);
   if (mesh.mesh.triangles.empty()) throw std::runtime_error("it holds no triangles");
   return mesh;
-}
-
-/// Number of edges where more triangles run one way than the other; each edge counts once for each missing triangle.
-std::size_t open_edges(const TriangleMesh& mesh) {
-  using Edge = std::pair<std::uint32_t, std::uint32_t>;
-  std::vector<Edge> forwards, backwards;  // From the lower to the higher vertex index, and the reverse.
-  for (const Triangle& t : mesh.triangles)
-    for (int i = 0; i < 3; ++i) {
-      const std::uint32_t from = t[i], to = t[(i + 1) % 3];
-      (from < to ? forwards : backwards).push_back(std::minmax(from, to));
-    }
-  std::sort(forwards.begin(), forwards.end());
-  std::sort(backwards.begin(), backwards.end());
-  std::vector<Edge> open;
-  std::set_symmetric_difference(forwards.begin(), forwards.end(), backwards.begin(), backwards.end(),
-                                std::back_inserter(open));
-  return open.size();
 }
 
 void turn_round(TriangleMesh& mesh) {

@@ -208,49 +208,6 @@ void split_folder(const fs::path& from, const fs::path& relative, int first, con
   }
 }
 
-std::string without_comments(const std::string& text) {
-  std::string result;
-  for (std::size_t i = 0; i < text.size();) {
-    const bool is_line = text.compare(i, 2, "//") == 0;
-    if (is_line || text.compare(i, 2, "/*") == 0) {
-      const std::size_t end = is_line ? text.find('\n', i) : text.find("*/", i + 2);
-      if (end == std::string::npos) break;
-      result += ' ';
-      i = end + (is_line ? 1 : 2);
-    } else {
-      result += text[i++];
-    }
-  }
-  return result;
-}
-
-/// The beginning of a file, which may be compressed, without comments.
-std::string head_of(const fs::path& path) {
-  constexpr unsigned size = 1 << 16;  // The value of a uniform field stands before its patches.
-  std::string text(size, '\0');
-  const gzFile file = gzopen(path.c_str(), "rb");
-  if (!file) return {};
-  const int count = gzread(file, text.data(), size);
-  gzclose(file);
-  text.resize(count > 0 ? static_cast<std::size_t>(count) : 0);
-  return without_comments(text);
-}
-
-/// The words, perhaps in quotation marks, that follow a key and blanks.
-std::vector<std::string> words_after(const std::string& text, const std::string& key) {
-  const auto is_of_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
-  std::vector<std::string> words;
-  for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
-    const std::size_t end_of_key = at + key.size();
-    std::size_t begin = text.find_first_not_of(" \t\r\n\v\f", end_of_key);
-    if ((at > 0 && is_of_word(text[at - 1])) || begin == std::string::npos || begin == end_of_key) continue;
-    if (text[begin] == '"') ++begin;
-    const std::size_t end = std::min(text.find_first_of(" \t\r\n\v\f;\"", begin), text.size());
-    if (end > begin) words.push_back(text.substr(begin, end - begin));
-  }
-  return words;
-}
-
 /// Whether a file says that its values are a list: neither one for all cells, nor elsewhere (in a macro, or in another
 /// file that it includes).
 bool has_list(const std::string& head) {
@@ -328,9 +285,52 @@ std::vector<fs::path> processor_cases(const OpenFoamParts& parts, const OpenFoam
   return cases;
 }
 
+std::string openfoam_text(const fs::path& path, std::size_t size) {
+  std::string text;
+  std::vector<char> buffer(std::min<std::size_t>(size, 1 << 20));
+  const gzFile file = gzopen(path.c_str(), "rb");
+  if (!file) return {};
+  for (int count = 1; count > 0 && text.size() < size;
+       text.append(buffer.data(), static_cast<std::size_t>(std::max(count, 0))))
+    count = gzread(file, buffer.data(), static_cast<unsigned>(buffer.size()));
+  gzclose(file);
+  return text;
+}
+
+std::string without_comments(const std::string& text) {
+  std::string result;
+  for (std::size_t i = 0; i < text.size();) {
+    const bool is_line = text.compare(i, 2, "//") == 0;
+    if (is_line || text.compare(i, 2, "/*") == 0) {
+      const std::size_t end = is_line ? text.find('\n', i) : text.find("*/", i + 2);
+      if (end == std::string::npos) break;
+      result += ' ';
+      i = end + (is_line ? 1 : 2);
+    } else {
+      result += text[i++];
+    }
+  }
+  return result;
+}
+
+std::vector<std::string> words_after(const std::string& text, const std::string& key) {
+  const auto is_of_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+  std::vector<std::string> words;
+  for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
+    const std::size_t end_of_key = at + key.size();
+    std::size_t begin = text.find_first_not_of(" \t\r\n\v\f", end_of_key);
+    if ((at > 0 && is_of_word(text[at - 1])) || begin == std::string::npos || begin == end_of_key) continue;
+    if (text[begin] == '"') ++begin;
+    const std::size_t end = std::min(text.find_first_of(" \t\r\n\v\f;\"", begin), text.size());
+    if (end > begin) words.push_back(text.substr(begin, end - begin));
+  }
+  return words;
+}
+
 void correct_uniform_tensors(vtkDataSet& data, const fs::path& time) {
   for (const auto& entry : fs::directory_iterator(time)) {
-    const std::string head = entry.is_regular_file() ? head_of(entry.path()) : "";
+    constexpr std::size_t size = 1 << 16;  // The value of a uniform field stands before its patches.
+    const std::string head = entry.is_regular_file() ? without_comments(openfoam_text(entry.path(), size)) : "";
     const std::vector<std::string> names = words_after(head, "object");  // VTK's arrays have them.
     if (names.empty() || has_list(head)) continue;
     for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) {

@@ -2,6 +2,7 @@
 /// @file tools/import/cases/openfoam.h
 /// The folders of an OpenFOAM case, regions and the parts that processors wrote, and the order of its tensors.
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -36,6 +37,13 @@ OpenFoamParts openfoam_parts(const std::filesystem::path& path, const std::files
 /// @throw std::runtime_error naming the file: a collated file is damaged.
 std::vector<std::filesystem::path> processor_cases(const OpenFoamParts& parts, const OpenFoamTime& time,
                                                    const std::filesystem::path& target);
+
+/// The beginning of a file, which may be compressed, at most `size` bytes.
+std::string openfoam_text(const std::filesystem::path& path, std::size_t size);
+std::string without_comments(const std::string& text);
+
+/// The words, perhaps in quotation marks, that follow a key and blanks.
+std::vector<std::string> words_after(const std::string& text, const std::string& key);
 
 /// Gives symmetric tensors that are `uniform` in their files VTK's order. OpenFOAM writes xx xy xz yy yz zz; VTK
 /// changes lists to its own order, xx yy zz xy yz xz, but not what is uniform. Fields whose values are not in the file

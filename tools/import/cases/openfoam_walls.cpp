@@ -15,9 +15,6 @@
 #include <vtkOpenFOAMReader.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
-#include <zlib.h>
-
-#include "base/text/text.h"
 
 namespace tensorray {
 namespace {
@@ -31,38 +28,16 @@ struct PatchEntry {
   bool has_value = false;
 };
 
-std::string text_of(const fs::path& path) {
-  std::string text;
-  std::vector<char> buffer(1 << 20);
-  const gzFile file = gzopen(path.c_str(), "rb");
-  if (!file) return {};
-  for (int count = 0; (count = gzread(file, buffer.data(), static_cast<unsigned>(buffer.size()))) > 0;) {
-    text.append(buffer.data(), static_cast<std::size_t>(count));
-    if (text.size() <= buffer.size() && text.find("volVectorField") == std::string::npos) break;
-  }
-  gzclose(file);
-  return text;
-}
-
-constexpr const char* blanks = " \t\r\n";
-
-/// The word that follows a key, which is a word itself; empty if there is none.
-std::string word_after(const std::string& text, const std::string& key) {
-  for (std::size_t i = text.find(key); i != std::string::npos; i = text.find(key, i + 1)) {
-    const std::size_t from = text.find_first_not_of(blanks, i + key.size());
-    const bool begins = i == 0 || std::string(blanks).append(";").find(text[i - 1]) != std::string::npos;
-    if (!begins || from == std::string::npos || from == i + key.size()) continue;
-    return text.substr(from, text.find_first_of(" \t\r\n;({", from) - from);
-  }
-  return {};
-}
-
 PatchEntry patch_entry(const std::string& name, const std::string& text) {
+  const auto first = [&](const char* key) {
+    const std::vector<std::string> words = words_after(text, key);
+    return words.empty() ? std::string() : words.front();
+  };
   PatchEntry entry{name, {}, false};
-  const std::string type = word_after(text, "type"), value = word_after(text, "value");
+  const std::string type = first("type"), value = first("value");
   const bool is_joined =
       type == "empty" || type == "wedge" || type.rfind("cyclic", 0) == 0 || type.rfind("processor", 0) == 0;
-  entry.has_value = type != "noSlip" && (value == "uniform" || value == "nonuniform");
+  entry.has_value = type != "noSlip" && (value.rfind("uniform", 0) == 0 || value.rfind("nonuniform", 0) == 0);
   if (type == "zeroGradient")
     entry.kind = Wall::Kind::zero_gradient;
   else if (type == "symmetry" || type == "symmetryPlane" || type == "slip")
@@ -74,8 +49,9 @@ PatchEntry patch_entry(const std::string& name, const std::string& text) {
 
 /// The entries of boundaryField, each of which is a name and a group in braces.
 std::vector<PatchEntry> patch_entries(const std::string& text) {
+  constexpr const char* blanks = " \t\r\n";
   std::vector<PatchEntry> entries;
-  std::size_t open = text.find('{', text.rfind("boundaryField"));
+  std::size_t open = text.find('{');
   while (open != std::string::npos && (open = text.find('{', open + 1)) != std::string::npos) {
     const std::size_t end = text.find_last_not_of(blanks, open - 1),
                       close = std::min(text.find('}', open), text.size());
@@ -106,9 +82,12 @@ using Entries = std::map<std::string, std::vector<PatchEntry>>;
 Entries entries_in(const fs::path& folder) {
   Entries entries;
   for (const auto& file : fs::directory_iterator(folder)) {
-    const std::string text = file.is_regular_file() ? text_of(file.path()) : "";
-    if (text.find("volVectorField") == std::string::npos || text.find("boundaryField") == std::string::npos) continue;
-    entries[word_after(text, "object")] = patch_entries(text);
+    const std::string head = file.is_regular_file() ? without_comments(openfoam_text(file.path(), 1 << 12)) : "";
+    const std::vector<std::string> kind = words_after(head, "class"), name = words_after(head, "object");
+    if (kind.empty() || kind.front() != "volVectorField" || name.empty()) continue;
+    const std::string text = openfoam_text(file.path(), std::string::npos);
+    if (const std::size_t patches = text.rfind("boundaryField"); patches != std::string::npos)
+      entries[name.front()] = patch_entries(without_comments(text.substr(patches)));
   }
   return entries;
 }

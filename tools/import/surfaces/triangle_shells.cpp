@@ -9,7 +9,6 @@
 
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 namespace tensorray {
 namespace {
@@ -112,24 +111,6 @@ void divide(TriangleMesh& mesh, int axis, double position) {
 Vector3d area_of(const TriangleMesh& shells, std::size_t triangle) {
   const Vector3d& a = corner(shells, triangle, 0);
   return 0.5 * (corner(shells, triangle, 1) - a).cross(corner(shells, triangle, 2) - a);
-}
-
-std::size_t open_edges(const TriangleMesh& shells) {
-  std::vector<std::array<std::uint32_t, 3>> edges;  // From the lower to the higher vertex, and the way of the triangle.
-  for (const auto& t : shells.triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b), a < b ? 1u : 0u});
-    }
-  tbb::parallel_sort(edges.begin(), edges.end());
-  std::size_t open = 0;
-  for (std::size_t i = 0, next = 0; i < edges.size(); i = next) {
-    int sum = 0;
-    for (next = i; next < edges.size() && edges[next][0] == edges[i][0] && edges[next][1] == edges[i][1]; ++next)
-      sum += edges[next][2] == 1 ? 1 : -1;
-    open += sum != 0 ? 1 : 0;
-  }
-  return open;
 }
 
 std::vector<char> inner_triangles(const TriangleMesh& shells) {

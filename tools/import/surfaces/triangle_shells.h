@@ -12,9 +12,6 @@ namespace tensorray {
 /// The normal of a triangle, as long as its area.
 Eigen::Vector3d area_of(const TriangleMesh& shells, std::size_t triangle);
 
-/// The number of edges along which more triangles run one way than the other.
-std::size_t open_edges(const TriangleMesh& shells);
-
 /// For each triangle, whether another shell contains its outer side, a thousandth of its edges from its centroid. Uses
 /// all threads.
 std::vector<char> inner_triangles(const TriangleMesh& shells);
