@@ -87,7 +87,7 @@ Entries entries_in(const fs::path& folder) {
     if (kind.empty() || kind.front() != "volVectorField" || name.empty()) continue;
     const std::string text = openfoam_text(file.path(), std::string::npos);
     if (const std::size_t patches = text.rfind("boundaryField"); patches != std::string::npos)
-      entries[name.front()] = patch_entries(without_comments(text.substr(patches)));
+      entries[name.front()] = patch_entries(text.substr(patches));
   }
   return entries;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include <Eigen/Geometry>
@@ -124,7 +125,7 @@ void join_cells(vtkDataSet& mesh, const std::vector<CellSide>& sides, CellGraph&
   std::vector<CellSide> open;
   for (std::size_t i = 0, next = 0; i < sides.size(); i = next) {
     for (next = i + 1; next < sides.size() && sides[next].key == sides[i].key; ++next)
-      join(sides[next - 1].cell, sides[next].cell, graph);
+      for (std::size_t k = i; k < next; ++k) join(sides[k].cell, sides[next].cell, graph);
     if (next == i + 1) open.push_back(sides[i]);
   }
   join_open_faces(faces_at(mesh, graph.points, open), graph);

@@ -22,10 +22,8 @@ struct BodySurface {
 };
 
 /// The outside of all three-dimensional cells that carry data, with its holes: those that MeshCell loads, whose tensors
-/// (with_tensors; if there are any) are finite at the cell and at all its points. Triangles are so small that their
-/// edges are no farther than about `tolerance` (> 0) from faces that are curved or whose corners are in no plane. Faces
-/// that have an edge in common have the same vertices there. Uses all threads; the result does not depend on their
-/// number.
+/// (with_tensors; if there are any) are finite at the cell and at all its points; as triangles_of with this tolerance.
+/// Uses all threads; the result does not depend on their number.
 BodySurface body_surface(vtkDataSet& mesh, double tolerance);
 
 }  // namespace tensorray
