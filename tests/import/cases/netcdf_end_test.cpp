@@ -1,5 +1,3 @@
-#include "tools/import/cases/exodus.h"
-
 #include <limits>
 #include <string>
 
@@ -7,6 +5,7 @@
 
 #include "base/text/byte_order.h"
 #include "tests/import/mesh_files.h"
+#include "tools/import/cases/exodus.h"
 
 namespace tensorray {
 namespace {
