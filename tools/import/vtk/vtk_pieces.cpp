@@ -20,10 +20,12 @@
 #include <vtkDataSetAttributes.h>
 #include <vtkGenericCell.h>
 #include <vtkIdList.h>
+#include <vtkImageData.h>
 #include <vtkIntArray.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
+#include <vtkRectilinearGrid.h>
 #include <vtkSmartPointer.h>
 #include <vtkStaticCellLocator.h>
 #include <vtkUnsignedCharArray.h>
@@ -339,6 +341,14 @@ vtkSmartPointer<vtkDataSet> stacked(const DataSets& layers) {
   return appended(layers, false);
 }
 
+/// The numbers of points along the axes of an image or a rectilinear grid; zero of other sets.
+std::array<vtkIdType, 3> implied_points(vtkDataSet& set) {
+  std::array<int, 3> points{};
+  if (auto* const image = vtkImageData::SafeDownCast(&set)) image->GetDimensions(points.data());
+  if (auto* const grid = vtkRectilinearGrid::SafeDownCast(&set)) grid->GetDimensions(points.data());
+  return {points[0], points[1], points[2]};
+}
+
 }  // namespace
 
 DataSets data_sets_in(vtkDataObject* data) {
@@ -349,14 +359,22 @@ DataSets data_sets_in(vtkDataObject* data) {
 
 bool is_same_mesh(vtkDataSet& a, vtkDataSet& b) {
   if (a.GetNumberOfPoints() != b.GetNumberOfPoints() || a.GetNumberOfCells() != b.GetNumberOfCells()) return false;
-  for (vtkIdType i = 0; i < a.GetNumberOfPoints(); ++i) {
+  const auto is_same_point = [&](vtkIdType i) {
     std::array<double, 3> x{}, y{};
     a.GetPoint(i, x.data());
     b.GetPoint(i, y.data());
-    if (x != y) return false;
+    return x == y;
+  };
+  const std::array<vtkIdType, 3> points = implied_points(a);
+  if (points != implied_points(b)) return false;
+  if (points[0] > 0) {  // There may be more than can be looked at; all follow from those along three edges.
+    for (vtkIdType axis = 0, stride = 1; axis < 3; stride *= points[axis++])
+      for (vtkIdType i = 0; i < points[axis]; ++i)
+        if (!is_same_point(stride * i)) return false;
+    return true;
   }
-  const auto is_regular = [](vtkDataSet& set) { return set.IsA("vtkImageData") || set.IsA("vtkRectilinearGrid"); };
-  if (is_regular(a) && is_regular(b)) return true;  // Their cells follow from their points.
+  for (vtkIdType i = 0; i < a.GetNumberOfPoints(); ++i)
+    if (!is_same_point(i)) return false;
   vtkNew<vtkIdList> of_a, of_b;
   for (vtkIdType id = 0; id < a.GetNumberOfCells(); ++id) {
     a.GetCellPoints(id, of_a);
