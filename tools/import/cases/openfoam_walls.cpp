@@ -82,7 +82,7 @@ using Entries = std::map<std::string, std::vector<PatchEntry>>;
 Entries entries_in(const fs::path& folder) {
   Entries entries;
   for (const auto& file : fs::directory_iterator(folder)) {
-    const std::string head = file.is_regular_file() ? without_comments(openfoam_text(file.path(), 1 << 12)) : "";
+    const std::string head = file.is_regular_file() ? without_comments(openfoam_text(file.path(), 1 << 16)) : "";
     const std::vector<std::string> kind = words_after(head, "class"), name = words_after(head, "object");
     if (kind.empty() || kind.front() != "volVectorField" || name.empty()) continue;
     const std::string text = openfoam_text(file.path(), std::string::npos);

@@ -66,11 +66,14 @@ std::vector<std::size_t> shape_of(const std::string& text, const std::filesystem
   std::istringstream stream(list);
   std::vector<std::size_t> shape;
   bool is_possible = true;
-  for (double extent = 0; is_possible && stream >> extent;) {
-    is_possible = extent >= 1 && extent <= std::numeric_limits<int>::max() && extent == std::floor(extent);
+  for (std::string word; is_possible && stream >> word;) {
+    char* rest = nullptr;
+    const double extent = std::strtod(word.c_str(), &rest);
+    is_possible =
+        *rest == '\0' && extent >= 1 && extent <= std::numeric_limits<int>::max() && extent == std::floor(extent);
     if (is_possible) shape.push_back(static_cast<std::size_t>(extent));
   }
-  if (!is_possible || !stream.eof())
+  if (!is_possible)
     fail(path, "its .npy header is damaged, or the array is empty: shape " + escaped(text.substr(0, end + 1)));
   return shape;
 }

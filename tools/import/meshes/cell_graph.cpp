@@ -82,6 +82,13 @@ void join(vtkIdType a, vtkIdType b, CellGraph& graph) {
   graph.neighbours[at(b)].push_back(a);
 }
 
+/// Whether two faces have more than two corners in common.
+bool share_corners(const CellFace& a, const CellFace& b) {
+  return std::count_if(a.corners.begin(), a.corners.end(), [&](vtkIdType corner) {
+           return std::count(b.corners.begin(), b.corners.end(), corner) > 0;
+         }) > 2;
+}
+
 /// Makes cells neighbours whose faces lie on each other without having the same corners.
 void join_open_faces(const std::vector<CellFace>& faces, CellGraph& graph) {
   if (faces.empty()) return;
@@ -114,8 +121,9 @@ void join_open_faces(const std::vector<CellFace>& faces, CellGraph& graph) {
       if (other.area.dot(measures[i].area) >= 0) continue;
       const Vector3d normal = other.area.normalized();
       const Eigen::Matrix3Xd bent = corners_of(faces[at(k)], graph.points).colwise() - other.centre;
-      if (std::abs(normal.dot(centre - other.centre)) <= reach + (normal.transpose() * bent).cwiseAbs().maxCoeff())
-        join(faces[i].cell, faces[at(k)].cell, graph);
+      // A bent face, and a part of it that is divided, are as far apart as it is bent.
+      const double warp = share_corners(faces[i], faces[at(k)]) ? (normal.transpose() * bent).cwiseAbs().maxCoeff() : 0;
+      if (std::abs(normal.dot(centre - other.centre)) <= reach + warp) join(faces[i].cell, faces[at(k)].cell, graph);
     }
   }
 }
@@ -129,10 +137,11 @@ void join_cells(vtkDataSet& mesh, const std::vector<CellSide>& sides, CellGraph&
     if (next == i + 1) open.push_back(sides[i]);
   }
   join_open_faces(faces_at(mesh, graph.points, open), graph);
-  for (Ids& ids : graph.neighbours) {
+  tbb::parallel_for(std::size_t{0}, graph.neighbours.size(), [&](std::size_t id) {
+    Ids& ids = graph.neighbours[id];
     std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  }
+  });
 }
 
 }  // namespace
@@ -164,11 +173,13 @@ CellGraph cell_graph(vtkDataSet& mesh, vtkDoubleArray& vectors) {
     graph.centres[at(id)] = centroid(cell, measures);
     graph.used[at(id)] = Eigen::Map<const Vector3d>(vectors.GetPointer(3 * id)).allFinite();
     std::size_t left = 0;
-    for (std::size_t i = 0; i < faces.size() && graph.used[at(id)]; ++i)
+    for (std::size_t i = 0; i < faces.size() && graph.used[at(id)]; ++i) {
+      if (measures[i].area.isZero(0)) continue;
       if (const std::optional<Wall> wall = finder.find(measures[i]))
         graph.walls[at(id)].push_back(*wall);
       else
         std::swap(faces[left++], faces[i]);
+    }
     faces.resize(left);
   };
   join_cells(mesh, sides_of(mesh, graph.points, choose), graph);

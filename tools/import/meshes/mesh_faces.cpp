@@ -243,7 +243,10 @@ std::vector<CellSide> sides_of(vtkDataSet& mesh, const MeshPoints& points, const
         std::transform(faces.begin(), faces.end(), std::back_inserter(parts.local()), side_of);
       });
   std::vector<CellSide> all;
-  for (const std::vector<CellSide>& part : parts) all.insert(all.end(), part.begin(), part.end());
+  for (std::vector<CellSide>& part : parts) {
+    all.insert(all.end(), part.begin(), part.end());
+    part = {};
+  }
   tbb::parallel_sort(all.begin(), all.end());
   return all;
 }

@@ -133,7 +133,7 @@ class Tessellation {
     constexpr double least = 1.0 / 64;  // Part of an edge that is not divided.
     if ((to - from).lpNorm<Eigen::Infinity>() <= least) return false;
     const Vector3d start = patch.at(from), chord = (patch.at(to) - start).normalized();
-    for (double part = 0.125; part < 1; part += 0.125) {
+    for (const double part : {0.5, 0.25, 0.75}) {
       const Vector3d step = patch.at(from + part * (to - from)) - start;
       if ((step - chord.dot(step) * chord).norm() > tolerance_) return true;
     }

@@ -26,16 +26,19 @@ Eigen::Matrix3Xd extreme_points(const std::vector<CellFace>& faces, const MeshPo
   Eigen::Matrix3Xd cloud(3, static_cast<Eigen::Index>(corners.size()));
   Eigen::Index next = 0;
   for (const vtkIdType corner : corners) cloud.col(next++) = points[corner];
+  std::set<Eigen::Index> farthest;
   constexpr int directions = 4000;
   const double golden_angle = pi * (3 - std::sqrt(5.0));
-  Eigen::Matrix3Xd extreme(3, directions);
   for (int i = 0; i < directions; ++i) {
     const double z = 1 - (2 * i + 1.0) / directions, radius = std::sqrt(1 - z * z);
     const Vector3d direction(radius * std::cos(golden_angle * i), radius * std::sin(golden_angle * i), z);
     Eigen::Index point = 0;
     (direction.transpose() * cloud).maxCoeff(&point);
-    extreme.col(i) = cloud.col(point);
+    farthest.insert(point);
   }
+  Eigen::Matrix3Xd extreme(3, static_cast<Eigen::Index>(farthest.size()));
+  next = 0;
+  for (const Eigen::Index point : farthest) extreme.col(next++) = cloud.col(point);
   return extreme;
 }
 
@@ -43,6 +46,7 @@ TriangleMesh surrounded_surface(vtkDataSet& mesh) {
   const MeshPoints points = points_of(mesh);
   std::vector<CellFace> faces =
       outer_faces(mesh, points, [](const MeshCell&, vtkIdType, const std::vector<CellFace>&) {});
+  remove_crossed_faces(faces, points);
   if (faces.empty()) throw std::invalid_argument("the mesh has no three-dimensional cells: it lies around no body");
   const Eigen::Matrix3Xd extreme = extreme_points(faces, points);
   const double diagonal = (extreme.rowwise().maxCoeff() - extreme.rowwise().minCoeff()).norm();

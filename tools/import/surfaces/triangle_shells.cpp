@@ -20,27 +20,29 @@ const Vector3d& corner(const TriangleMesh& mesh, std::size_t triangle, std::size
   return mesh.vertices[mesh.triangles[triangle][k]];
 }
 
-/// Counts the shells that contain a point, from the triangles above it that a search in a tree of boxes finds.
+/// Counts the shells that contain a point, from the triangles beyond it along an axis that a search in a tree of boxes
+/// finds.
 struct ShellCount {
   const TriangleMesh& mesh;
+  int axis;
   Vector3d point;
   int count = 0;
 
   bool intersectVolume(const Eigen::AlignedBox3d& box) const {
-    const Vector3d lowest(box.min().x(), box.min().y(), point.z());
+    Vector3d lowest = box.min();
+    lowest[axis] = point[axis];
     return (point.array() >= lowest.array()).all() && (point.array() <= box.max().array()).all();
   }
 
   /// @return false: the search goes on.
   bool intersectObject(std::uint32_t triangle) {
     const Vector3d area = area_of(mesh, triangle);
-    if (!(std::abs(area.z()) > 1e-9 * area.norm())) return false;  // Is seen as a line.
     for (std::size_t k = 0; k < 3; ++k) {
       const Vector3d from = point - corner(mesh, triangle, k);
-      const double turn = (corner(mesh, triangle, (k + 1) % 3) - corner(mesh, triangle, k)).cross(from).z();
-      if (area.z() > 0 ? !(turn >= 0) : !(turn < 0)) return false;
+      const double turn = (corner(mesh, triangle, (k + 1) % 3) - corner(mesh, triangle, k)).cross(from)[axis];
+      if (area[axis] > 0 ? !(turn >= 0) : !(turn < 0)) return false;
     }
-    if (area.dot(corner(mesh, triangle, 0) - point) / area.z() > 0) count += area.z() > 0 ? 1 : -1;
+    if (area.dot(corner(mesh, triangle, 0) - point) / area[axis] > 0) count += area[axis] > 0 ? 1 : -1;
     return false;
   }
 };
@@ -81,11 +83,18 @@ Vector3d area_of(const TriangleMesh& shells, std::size_t triangle) {
 std::vector<char> inner_triangles(const TriangleMesh& shells) {
   std::vector<char> inner(shells.triangles.size(), 0);
   if (inner.empty()) return inner;
-  std::vector<std::uint32_t> numbers(inner.size());
-  std::vector<Eigen::AlignedBox3d> boxes(inner.size());
+  Eigen::AlignedBox3d bounds;
+  for (const Vector3d& vertex : shells.vertices) bounds.extend(vertex);
+  int axis = 0;  // Along it, few triangles are in a row.
+  bounds.sizes().minCoeff(&axis);
+  std::vector<std::uint32_t> numbers;
+  std::vector<Eigen::AlignedBox3d> boxes;
   for (std::size_t i = 0; i < inner.size(); ++i) {
-    numbers[i] = static_cast<std::uint32_t>(i);
-    for (std::size_t k = 0; k < 3; ++k) boxes[i].extend(corner(shells, i, k));
+    const Vector3d area = area_of(shells, i);
+    if (!(std::abs(area[axis]) > 1e-9 * area.norm())) continue;  // Is seen as a line.
+    numbers.push_back(static_cast<std::uint32_t>(i));
+    boxes.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) boxes.back().extend(corner(shells, i, k));
   }
   const Eigen::KdBVH<double, 3, std::uint32_t> tree(numbers.begin(), numbers.end(), boxes.begin(), boxes.end());
   tbb::parallel_for(std::size_t{0}, inner.size(), [&](std::size_t i) {
@@ -94,7 +103,7 @@ std::vector<char> inner_triangles(const TriangleMesh& shells) {
     const Vector3d &a = corner(shells, i, 0), &b = corner(shells, i, 1), &c = corner(shells, i, 2);
     // Not quite above the centroid, which others may have in common with it.
     const Vector3d above = 1e-3 * (area / std::sqrt(area.norm()) + 0.0137 * (b - a) + 0.0071 * (c - a));
-    ShellCount shells_at{shells, (a + b + c) / 3 + above};
+    ShellCount shells_at{shells, axis, (a + b + c) / 3 + above};
     Eigen::BVIntersect(tree, shells_at);
     inner[i] = shells_at.count > 0;
   });

@@ -368,8 +368,9 @@ bool is_same_mesh(vtkDataSet& a, vtkDataSet& b) {
   const std::array<vtkIdType, 3> points = implied_points(a);
   if (points != implied_points(b)) return false;
   if (points[0] > 0) {  // There may be more than can be looked at; all follow from those along three edges.
-    for (vtkIdType axis = 0, stride = 1; axis < 3; stride *= points[axis++])
-      for (vtkIdType i = 0; i < points[axis]; ++i)
+    const bool even = vtkImageData::SafeDownCast(&a) && vtkImageData::SafeDownCast(&b);  // From the ends of these.
+    for (vtkIdType axis = 0, stride = 1; axis < 3; stride *= axis < 2 ? points[axis] : 1, ++axis)
+      for (vtkIdType i = 0; i < points[axis]; i += even ? std::max<vtkIdType>(1, points[axis] - 1) : 1)
         if (!is_same_point(stride * i)) return false;
     return true;
   }
