@@ -4,7 +4,6 @@
 #include <stdexcept>
 #include <system_error>
 #include <tuple>
-#include <utility>
 
 #include <sys/stat.h>
 

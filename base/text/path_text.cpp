@@ -1,7 +1,6 @@
 #include "base/text/path_text.h"
 
 #include <cstddef>
-#include <cstdint>
 
 #include <fmt/core.h>
 #include <unistd.h>

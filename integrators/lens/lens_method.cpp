@@ -1,7 +1,6 @@
 #include "integrators/lens/lens_method.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <Eigen/LU>
 #include <fmt/format.h>
@@ -13,7 +12,6 @@
 #include "scenes/outputs/body_outline.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
-#include "scenes/scene/scene.h"
 
 namespace tensorray {
 namespace {

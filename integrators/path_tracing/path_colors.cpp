@@ -1,11 +1,9 @@
 #include "integrators/path_tracing/path_colors.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <tbb/parallel_for.h>
 
-#include "integrators/path_tracing/path_tracing_method.h"
 #include "renderer/charts/color_bar.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "volumes/tensors/invariants.h"

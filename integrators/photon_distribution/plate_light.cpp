@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "base/process/seconds.h"
 #include "integrators/photon_distribution/photon_distribution.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
 #include "renderer/film/spectral_image.h"

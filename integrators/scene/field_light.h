@@ -3,9 +3,7 @@
 /// The lights of the method "scene", and the light that they throw through the field on its objects. Each pair of a
 /// light and an object has either photons (photons.cpp) or a flow map (sunlight.cpp).
 
-#include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <vector>
 

@@ -10,7 +10,6 @@
 #include "integrators/path_tracing/path_tracing_method.h"
 #include "integrators/path_tracing/stage.h"
 #include "integrators/scene/field_light.h"
-#include "integrators/scene/field_region.h"
 #include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/picture_outputs.h"

@@ -8,7 +8,6 @@
 #include <stdexcept>
 #include <string>
 
-#include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"

@@ -2,7 +2,6 @@
 /// @file python/module/arrays.h
 /// NumPy arrays of C++ memory, and the other way round. All functions need the GIL.
 
-#include <cstddef>
 #include <memory>
 #include <stdexcept>
 #include <string>

@@ -8,7 +8,6 @@
 #include <stdexcept>
 #include <string>
 
-#include <pybind11/pybind11.h>
 #include <pybind11/stl/filesystem.h>
 
 #include "base/process/child_program.h"

@@ -7,7 +7,6 @@
 
 #include "base/process/process_limits.h"
 #include "base/process/seconds.h"
-#include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
 #include "python/module/module.h"

@@ -1,8 +1,5 @@
 #include "python/module/scene_request.h"
 
-#include <stdexcept>
-#include <utility>
-
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 

@@ -8,8 +8,6 @@
 
 #include <fmt/core.h>
 
-#include "scenes/keys/key_visitor.h"
-
 namespace tensorray {
 namespace {
 

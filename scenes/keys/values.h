@@ -3,7 +3,6 @@
 /// How values of each type are written in a scene file: one trait for each type.
 
 #include <algorithm>
-#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>

@@ -3,7 +3,6 @@
 /// The pictures that every method can write, and the header entries of all files.
 
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "renderer/camera/camera.h"

@@ -1,7 +1,6 @@
 #include "scenes/source/frames.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <unordered_set>
 

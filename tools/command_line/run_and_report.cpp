@@ -2,11 +2,8 @@
 
 #include <csignal>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <new>
-#include <stdexcept>
-#include <string>
 #include <system_error>
 
 #include <CLI/Error.hpp>

@@ -14,7 +14,6 @@
 #include "base/process/seconds.h"
 #include "base/text/path_text.h"
 #include "base/text/text.h"
-#include "scenes/jobs/work_file.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/tell.h"
 #include "tools/rendering/run_outputs.h"

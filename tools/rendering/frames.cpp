@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "base/text/text.h"
 #include "scenes/jobs/work_file.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"

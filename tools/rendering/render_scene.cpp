@@ -2,10 +2,8 @@
 
 #include <cmath>
 #include <future>
-#include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -14,11 +12,9 @@
 #include "base/text/numbered_name.h"
 #include "base/text/text.h"
 #include "renderer/images/image.h"
-#include "scenes/jobs/work_file.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
-#include "scenes/scene/scene.h"
 #include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"

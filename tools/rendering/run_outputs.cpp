@@ -4,7 +4,6 @@
 
 #include "base/files/distinct_files.h"
 #include "base/text/path_text.h"
-#include "base/text/text.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/source/frames.h"
 

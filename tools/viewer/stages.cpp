@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "base/text/text.h"
 #include "scenes/description/check_scene.h"
 
 namespace tensorray {

@@ -2,7 +2,6 @@
 /// @file tools/viewer/server/token.h
 /// The secret in the address of a live view.
 
-#include <filesystem>
 #include <string>
 
 namespace tensorray {
