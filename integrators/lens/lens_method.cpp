@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
-#include "renderer/charts/grid_lines.h"
+#include "renderer/charts/ink.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/body_outline.h"

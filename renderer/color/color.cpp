@@ -15,7 +15,6 @@
 #include "base/text/text.h"
 #include "renderer/color/chromaticities.h"
 #include "renderer/color/file_colors.h"
-#include "renderer/color/icc_profile.h"
 
 namespace OCIO = OCIO_NAMESPACE;
 

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "renderer/images/image.h"
-#include "renderer/sampling/distribution.h"
+#include "renderer/sampling/sampling.h"
 
 namespace tensorray {
 

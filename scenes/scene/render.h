@@ -17,7 +17,7 @@
 #include "renderer/film/film.h"
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
-#include "renderer/light_maps/photon_counts.h"
+#include "renderer/light_maps/photon_map.h"
 #include "tracing/bending/bending.h"
 #include "tracing/paths/paths.h"
 #include "volumes/grids/tensor_grid.h"

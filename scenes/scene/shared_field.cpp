@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
-#include "base/files/shared_file.h"
+#include "base/files/temporary_folder.h"
 #include "base/process/archive.h"
 #include "base/text/content_hash.h"
 #include "scenes/scene/scene.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "base/text/numbered_name.h"
+#include "base/text/path_text.h"
 #include "scenes/keys/json_reader.h"
 
 namespace tensorray {
@@ -17,7 +17,7 @@ namespace tensorray {
 std::vector<int> parse_frames(const std::string& text);
 
 /// Replaces, everywhere in a scene, keyframes by their value at a frame, and # in texts (also %04d and $F4, see
-/// numbered_name.h) by the frame's number.
+/// path_text.h) by the frame's number.
 ///
 /// Keyframes take the place of a number or of a list of numbers:
 ///   {"keys": [[1, [0, 0, -1]], [240, [0, 1, -1]]], "ease": "smooth"}

@@ -17,7 +17,7 @@
 #include "integrators/path_files/path_files.h"
 #include "integrators/photon_distribution/photon_chunks.h"
 #include "integrators/seeds/seeds.h"
-#include "renderer/color/icc_profile.h"
+#include "renderer/color/file_colors.h"
 #include "renderer/images/formats.h"
 #include "renderer/meshes/mesh_readers.h"
 #include "renderer/spectra/spectrum.h"

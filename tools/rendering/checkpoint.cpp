@@ -16,7 +16,7 @@
 #include "base/text/text.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/tell.h"
-#include "tools/rendering/run_outputs.h"
+#include "tools/rendering/render_scene.h"
 
 namespace tensorray {
 namespace {

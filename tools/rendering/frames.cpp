@@ -12,7 +12,6 @@
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/rendering/render_scene.h"
-#include "tools/rendering/run_outputs.h"
 
 namespace tensorray {
 namespace {

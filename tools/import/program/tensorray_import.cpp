@@ -24,7 +24,7 @@
 #include "base/files/output_file.h"
 #include "base/files/temporary_folder.h"
 #include "base/process/progress.h"
-#include "base/text/numbered_name.h"
+#include "base/text/path_text.h"
 #include "base/text/text.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/progress_bar.h"

@@ -20,7 +20,6 @@
 #include "tools/command_line/threads.h"
 #include "tools/viewer/pages.h"
 #include "tools/viewer/server/server.h"
-#include "tools/viewer/server/token.h"
 
 namespace {
 
