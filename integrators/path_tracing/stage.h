@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/path_tracing/stage.h
-/// What all pictures of surfaces share: camera and lights (studio.cpp), the settings of the path tracer, visible lamps,
+/// What all pictures of surfaces share: camera and lights, the settings of the path tracer, visible lamps,
 /// and the channels of the picture.
 
 #include <filesystem>

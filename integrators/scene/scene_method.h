@@ -34,7 +34,7 @@ struct SceneMethodDescription {
   PhotonsDescription photons;
 };
 
-inline Choices<Conserve> choices(Conserve) { return {{"power", Conserve::power}, {"radiance", Conserve::radiance}}; }
+inline Words words(Conserve) { return {"power", "radiance"}; }
 
 inline void describe(CausticDescription& caustic, KeyVisitor& visit) {
   visit("resolution", caustic.resolution, "pixels along the longer side of the part of a plate where light lands",

@@ -87,16 +87,24 @@ inline Limits endings(std::vector<std::string> allowed) {
   return limits;
 }
 
-/// Names in scene files for the values of an enumeration. `choices(Enum{})` returns all values and their names; its
-/// argument only selects the overload.
+/// Names in scene files for the values of an enumeration, in its order. `words(Enum{})` returns them; its argument only
+/// selects the overload.
+using Words = std::vector<const char*>;
+
+/// The same as pairs. An enumeration whose names are listed in another order has `choices(Enum{})` instead of `words`.
 template <class Enum>
 struct Choice {
   const char* name;
   Enum value;
 };
-
 template <class Enum>
 using Choices = std::vector<Choice<Enum>>;
+template <class Enum>
+Choices<Enum> choices(Enum) {
+  Choices<Enum> all;
+  for (const char* word : words(Enum{})) all.push_back({word, static_cast<Enum>(all.size())});
+  return all;
+}
 
 /// The name of a value.
 template <class Enum>

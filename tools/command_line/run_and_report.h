@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/process/progress.h"
+
 namespace tensorray {
 
 /// Work that was interrupted, and kept what it had: exit status 130.
@@ -24,5 +26,15 @@ int run_and_report(const std::function<void()>& work);
 /// The same for the program that started this one with run_program (base/process/child_program.h): ends with it, takes
 /// no more memory than there is, and prints an error without the program's name.
 int answer_parent(const std::function<void()>& work);
+
+// How the programs handle signals.
+
+/// Makes SIGINT (Ctrl-C) and SIGTERM cancel the returned progress, which lives as long as the program. A second
+/// signal ends the program at once. Broken pipes and file-size limits become errors of the write that meets them.
+Progress& progress_until_interrupted();
+
+/// Whether SIGUSR1, which asks for a picture of what there is so far, has come since the last call. It does nothing
+/// else.
+bool take_picture_request();
 
 }  // namespace tensorray

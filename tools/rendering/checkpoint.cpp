@@ -14,7 +14,7 @@
 #include "base/process/seconds.h"
 #include "base/text/path_text.h"
 #include "base/text/text.h"
-#include "tools/command_line/interrupts.h"
+#include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/rendering/render_scene.h"
 

@@ -16,7 +16,6 @@
 #include "scenes/keys/json_reader.h"
 #include "scenes/scene/render.h"
 #include "scenes/source/frames.h"
-#include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"

@@ -26,8 +26,6 @@
 #include "base/process/progress.h"
 #include "base/text/path_text.h"
 #include "base/text/text.h"
-#include "tools/command_line/interrupts.h"
-#include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
