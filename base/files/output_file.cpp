@@ -59,8 +59,7 @@ int own_descriptor(fs::path path) {
   return -1;
 }
 
-/// Opens a device. What this process has open gets more bytes where the last ones ended: it may be a file that a shell
-/// has begun.
+/// Opens a device. What this process has open gets bytes where the last ones ended: a shell may have begun it.
 Descriptor open_device(const fs::path& device) {
   const int own = own_descriptor(device);
   return own < 0 ? open_file(device, O_WRONLY) : Descriptor(fcntl(own, F_DUPFD_CLOEXEC, 0));

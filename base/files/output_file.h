@@ -13,8 +13,7 @@ namespace tensorray {
 /// file at the target stays until then, and stays if the work fails.
 ///
 /// Symbolic links are followed: the link stays, and the file that it points to is replaced. A target that is not a
-/// regular file (a device, a pipe), or that this process has open (/dev/stdout, /dev/fd/3), is never replaced: the
-/// bytes are copied into it.
+/// regular file (a device, a pipe), or that this process has open (/dev/stdout, /dev/fd/3), gets the bytes instead.
 class OutputFile {
  public:
   /// Makes the empty temporary file, so that a target that cannot be written is reported before the work begins.
@@ -80,8 +79,7 @@ std::filesystem::path behind_links(const std::filesystem::path& target);
 /// Writes `pieces`, one after the other, to a file beside it, waits until they are on the disk, and gives them the name
 /// `file`. Whenever the process or the machine stops, `file` is complete: as it was, or as it becomes. The file beside
 /// it, `.tensorray-HASH.new` with a hash of the name, is always the same, so that processes that were killed leave no
-/// more than one; it is not one that a user names. An OutputFile, in contrast, lets two processes write the same target
-/// at once, and follows links.
+/// more than one; it is not one that a user names. An OutputFile, unlike it, follows links.
 /// @throw std::runtime_error naming the file, for example because the disk is full. The old file is then unchanged.
 void replace_file(const std::filesystem::path& file, const std::vector<std::string_view>& pieces);
 

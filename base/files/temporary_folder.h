@@ -58,8 +58,7 @@ class SharedFile {
  public:
   /// Finds the file of another process. Waits while another one makes it. If no process has it, others that ask for it
   /// wait until this one offers its own, or until this object ends: one that will not offer must end.
-  /// @param key      Letters and digits. @param waiting  Called every few hundredths of a second of waiting; what it
-  /// throws ends it.
+  /// @param key      Letters and digits. @param waiting  Called often while it waits; what it throws ends it.
   SharedFile(const std::string& key, const std::function<void()>& waiting);
   ~SharedFile();
   SharedFile(const SharedFile&) = delete;

@@ -32,8 +32,7 @@ struct TriangleMesh {
   }
 };
 
-/// The number of edges along which more triangles run one way than the other; each counts once for each triangle that
-/// is missing. A closed mesh has none.
+/// The number of edges along which more triangles run one way than the other; each counts once a missing triangle.
 std::size_t open_edges(const TriangleMesh& mesh);
 
 }  // namespace tensorray

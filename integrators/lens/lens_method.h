@@ -1,7 +1,6 @@
 #pragma once
 /// @file integrators/lens/lens_method.h
-/// The method "lens": an image seen through the field. The keys of `integrator` that it has; lengths are in world
-/// units.
+/// The method "lens": an image seen through the field. Its keys of `integrator`; lengths are in world units.
 
 #include <filesystem>
 #include <memory>

@@ -21,12 +21,10 @@ struct SceneChanges {
   /// removes a key. An index one past the end of a list appends an item.
   std::vector<std::string> overrides;
 
-  /// Files to write instead of those of the scene, relative to the working folder. The ending of each file selects one
-  /// of the method's outputs.
+  /// Files to write instead of the scene's, relative to the working folder; their endings select the method's outputs.
   std::vector<std::filesystem::path> outputs;
 
-  /// The frame of a scene that changes (see set_frame); # in `outputs` is its number, too. None: the scene must not
-  /// have keyframes.
+  /// The frame of a scene that changes (set_frame); # in `outputs` is its number, too. None: no keyframes are allowed.
   std::optional<int> frame = std::nullopt;
 };
 

@@ -107,8 +107,7 @@ Camera with_lens(Camera camera, const CameraDescription& description) {
   return camera;
 }
 
-/// A camera that shows the points in the left part of the picture. It is made for a narrower picture and then moved
-/// along the plane of the picture.
+/// A camera that shows the points in the left part of the picture: made for a narrower one, and moved along its plane.
 Camera chosen_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double free) {
   const double free_pixels = std::floor(free * description.resolution.x());
   Framing framing;

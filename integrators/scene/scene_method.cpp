@@ -60,8 +60,7 @@ std::vector<Vector3d> points_of_interest(const Scene& scene, const std::vector<S
   return points;
 }
 
-/// The volume for rays that are seen. Surfaces that reach into it stop light there; if there are any, all surfaces
-/// must.
+/// The volume for rays that are seen. If surfaces reach into it and stop light there, all must.
 Geometry seen_geometry(const Scene& scene, const SurfaceScene& stage) {
   Surfaces surfaces;
   surfaces.bounds = scene.geometry.surfaces().bounds;

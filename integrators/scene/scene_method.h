@@ -1,8 +1,7 @@
 #pragma once
 /// @file integrators/scene/scene_method.h
-/// The method "scene": surfaces lit by light that the field bends, seen by a camera whose rays it bends, too. The keys
-/// of `integrator` that only this method has; it shares bands, samples, noise, max_depth, indirect_clamp, filter,
-/// shading and background with path tracing.
+/// The method "scene": surfaces lit by light that the field bends, seen by a camera whose rays it bends, too. Its own
+/// keys of `integrator`; it shares others with path tracing.
 
 #include <cstdint>
 #include <memory>

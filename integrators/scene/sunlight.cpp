@@ -30,8 +30,8 @@ std::vector<Light> default_lights(const Scene& scene, const ShownLight& shown) {
   return {ConstantLight{shown.radiance(sky_color, sky_strength)}, sun};
 }
 
-/// All surfaces that stop light on its way to object `receiver`, and the object itself, if it is no plate. Paths show
-/// light, and do not stop it.
+/// All surfaces that stop light on its way to object `receiver`, and it itself, if it is no plate. Paths do not stop
+/// light.
 Surfaces surfaces_before(const LitObjects& lit, std::size_t receiver) {
   const std::vector<ShadedSurface>& all = lit.surfaces.surfaces();
   Surfaces surfaces;
@@ -128,8 +128,7 @@ void face(double side, IrradianceMap& light) {
   if (!(light.towards.dot(normal) > grazing_cosine)) light.towards = normal;
 }
 
-/// The light with this number on an object; nothing if none lands. @throw SceneError if the light is where it cannot
-/// be.
+/// The light with this number on an object; nothing if none lands. @throw SceneError if it is where it cannot be.
 std::optional<IrradianceMap> land(const LitObjects& lit, std::size_t number, const LandingLight& light,
                                   std::size_t receiver, const CausticDescription& caustic, const Progress& progress) {
   const Scene& scene = lit.scene;

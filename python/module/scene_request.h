@@ -37,8 +37,7 @@ class Field {
   TensorGrid grid() const { return to_grid(blocks_); }
   const TriangleMesh& surface() const { return blocks_.surface; }
 
-  /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if a choice differs from the
-  /// last one.
+  /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if a choice differs.
   LoadedField loaded(const FieldChoices& choices) const;
 
  private:

@@ -56,8 +56,7 @@ Knots make_knots(const std::string& table, bool cyclic) {
   Knots knots(1);
   for (std::size_t i = 0; i < table.size(); i += 6) knots.push_back(colour_of(table.substr(i, 6)));
   const std::size_t last = knots.size() - 1;
-  // The additional point continues the parabola through the last three, so that slopes at the ends are as accurate as
-  // inside.
+  // The additional point continues the parabola through the last three: slopes at the ends are as accurate as inside.
   knots[0] = cyclic ? knots[last - 1] : Eigen::Vector3d(3 * (knots[1] - knots[2]) + knots[3]);
   knots.push_back(cyclic ? knots[2] : Eigen::Vector3d(3 * (knots[last] - knots[last - 1]) + knots[last - 2]));
   return knots;

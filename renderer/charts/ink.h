@@ -17,8 +17,7 @@ namespace tensorray {
 /// @param distance  From the pixel's centre to the middle of the line, in pixels. @param width  In pixels.
 double line_coverage(double distance, double width);
 
-/// Mixes a colour into the first three channels of a pixel; `coverage` is its weight, 0 to 1. A channel "A" becomes
-/// opaque by the same weight.
+/// Mixes a colour into the first three channels of a pixel, and opacity into "A"; `coverage` is the weight, 0 to 1.
 void lay_over(Image& image, int x, int y, const Eigen::Vector3d& color, double coverage);
 
 // Positions and boxes are continuous, in pixels from the upper left corner. Parts outside the picture are cut off.
@@ -67,11 +66,9 @@ struct GridLines {
 /// Draws lines of constant s and t over the channels R, G, B of a picture. If there is a channel A, it becomes opaque
 /// under the lines. Lines are anti-aliased, have the same width everywhere, and fade out where they would be closer
 /// than three pixels. Pixels that are not valid, or whose coordinates are not finite, do not change. Where the picture
-/// is magnified a thousand times or more, no lines are drawn either: a single line could cover the whole region. Runs
-/// on all threads.
+/// is magnified a thousand times or more, no lines are drawn either. Runs on all threads.
 /// @param coordinates  One entry per pixel, row by row.
-/// @throw std::invalid_argument if sizes do not match, `image` does not begin with R, G, B, or a setting is out of
-/// range.
+/// @throw std::invalid_argument if sizes or settings do not fit, or `image` does not begin with R, G, B.
 void draw_grid_lines(Image& image, const std::vector<PixelCoordinates>& coordinates, const GridLines& lines);
 
 }  // namespace tensorray

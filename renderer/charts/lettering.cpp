@@ -13,8 +13,7 @@
 namespace tensorray {
 namespace {
 
-// The grid that letters are drawn on. Lines are the middles of strokes. A capital goes from y = 0 to 28, a small letter
-// to 20, a descender down to -6.
+// The grid that letters are drawn on. A capital goes from y = 0 to 28, a small letter to 20, a descender to -6.
 constexpr double stroke = 4;  // Width of all strokes.
 constexpr double gap = 6;     // Distance between the strokes of neighbouring characters.
 constexpr double highest = 28, lowest = -6;

@@ -41,8 +41,7 @@ struct AreaPhotons {
   std::vector<bool> surfaces;  ///< By index: whether photons light them.
 };
 
-/// The photons of one pass, sorted by cells of a lattice, then by band, then by their order before. Immutable: any
-/// thread may use it.
+/// The photons of one pass, sorted by cells of a lattice, then by band, then by their order before. Immutable.
 class PhotonMap {
  public:
   /// @param radius  Within which a photon lights its surface, world units; > 0.

@@ -1,7 +1,6 @@
 #pragma once
 /// @file renderer/light_maps/photon_tracer.h
-/// Traces photons of directional lights, points and area lights through a bending region to the surfaces behind it and
-/// within it.
+/// Traces photons of directional, point and area lights through a bending region to surfaces behind and within it.
 
 #include <cstdint>
 #include <functional>
@@ -30,8 +29,8 @@ struct PhotonTracerSettings {
   Job* job = nullptr;  ///< Whose ranks trace the photons together, and which keeps those of each pass; null: alone.
   /// Whether a light lights a surface by photons.
   std::function<bool(int light, std::uint32_t surface)> serves;
-  /// Of surfaces that are rectangles, by their index: photons near an edge are mirrored at it, so that the light that
-  /// their radius takes beyond it comes back.
+  /// Of surfaces that are rectangles, by their index: photons near an edge are mirrored at it, so that no light is lost
+  /// beyond it.
   std::vector<std::optional<Plate>> plates;
 };
 

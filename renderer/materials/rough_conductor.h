@@ -42,8 +42,7 @@ ConductorScattering prepare(const RoughConductor& settings);
 
 /// Sets f for wi and wo with z > 0, in as many bands as it has.
 /// @param reflectance  A factor of Fresnel's reflectance at every bounce.
-/// @return the density of `sample`. Directions below the surface, which it may give, have density 0, so the integral of
-/// the density is below 1.
+/// @return the density of `sample`; 0 below the surface, where it may give directions: its integral is below 1.
 double evaluate(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,
                 const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
 

@@ -25,8 +25,7 @@ struct View {
 
 View view_of(const DielectricScattering& glass, bool outside) {
   // The refracting lobe is near · far · c / π. By reciprocity, it is n² times larger for light that leaves to the
-  // inside than for light that leaves to the outside. A cone of light from one side is compressed by the same factor on
-  // the other.
+  // inside than for light that leaves to the outside. A cone of light is compressed by the same factor.
   const double index2 = squared(glass.index);
   if (outside)
     return {glass.index, glass.missing_outside, glass.missing_inside,

@@ -3,8 +3,7 @@
 /// Conventions that all models of scattering at a surface share.
 ///
 /// Frame: local; +z is the surface's normal. `wi` (towards the light) and `wo` (towards the viewer) are unit vectors
-/// that point away from the surface. f(wi, wo) is the radiance that leaves along wo per unit of irradiance that arrives
-/// along wi, in 1/sr, without a cosine.
+/// that point away from the surface. f(wi, wo) is the radiance along wo per unit of irradiance along wi, in 1/sr.
 ///
 /// Bands: every function works on all bands of a path at once. No index varies with wavelength in a way that bends a
 /// path (no dispersion), so all bands share every direction. Each path gives one sample to every band, so noise has no

@@ -25,8 +25,8 @@ OIIO::TypeDesc type_desc(SampleType type) {
   return type == SampleType::uint16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::FLOAT;
 }
 
-/// Whether TIFF and JPEG have a plain field for an attribute. For others OpenImageIO 2.4 would write an Exif directory,
-/// which it cannot do in memory for TIFF.
+/// Whether TIFF and JPEG have a plain field for an attribute. For others OpenImageIO 2.4 writes Exif, but not in memory
+/// for TIFF.
 bool is_plain(const std::string& attribute) {
   static const std::set<std::string> names{"ImageDescription", "Software", "Artist", "Copyright"};
   return names.count(attribute) > 0;
@@ -182,8 +182,7 @@ void say_choice(OIIO::ImageInput& input, int part, NativeImage& image) {
 }
 
 /// Finds colours in the first part of a file, or of an EXR in the first part that has some: without a layer's name, or
-/// else of a layer. Grey is taken if there are no colours, by its name before any single channel (depth). @return the
-/// part.
+/// else of a layer. Without colours, grey is taken, by its name before any channel (depth).
 int find_colors(OIIO::ImageInput& input, NativeImage& image) {
   using Spec = const OIIO::ImageSpec&;
   const std::function<bool(Spec)> finders[] = {

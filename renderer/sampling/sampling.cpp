@@ -24,8 +24,7 @@ std::uint64_t sequence_key(const PathSampler& path, int number) {
 
 Eigen::Vector2d vector(const std::array<double, 2>& pair) { return {pair[0], pair[1]}; }
 
-/// The direction about +z with 1 − cos θ = `height`. Uses 1 − cos θ, because cos θ is not accurate enough for small
-/// angles.
+/// The direction about +z with 1 − cos θ = `height`. cos θ is not accurate enough for small angles.
 Eigen::Vector3d direction_at(double height, double turn) {
   const double across = std::sqrt(std::max(0.0, height * (2 - height)));
   const Eigen::Vector2d place = across * circle_at(turn);

@@ -42,8 +42,7 @@ struct ShadingSettings {
   DirectLight direct = DirectLight::both;
   int max_depth = 8;  ///< Most surfaces at which a path scatters; >= 0. 1: direct light only.
   /// After this many surfaces, a path that carries less than a tenth of its luminance may end at random (Russian
-  /// roulette); >= 1. With 1, dark surfaces would be noisy under a sky, whose light only the material's samples
-  /// find.
+  /// roulette); >= 1. With 1, dark surfaces would be noisy under a sky.
   int roulette_depth = 2;
   /// Greatest luminance that light scattered twice or more adds, for each sample and surface; 1 is the luminance of the
   /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). With the
@@ -67,8 +66,7 @@ struct ShadedScene {
   /// Where light bends; null: it is straight everywhere. Surfaces get the light of directional lights and points
   /// through the region from `irradiance_maps` or `photons`; only rays of the camera look for it themselves.
   const BendingRegion* region = nullptr;
-  /// Bands that a ray of the camera, and one that surfaces have scattered, follows into the region. Both divide the
-  /// number of bands.
+  /// Bands that a ray of the camera, and a scattered one, follows into the region. Both divide the number of bands.
   int bands_per_view = 1, bands_per_bounce = 1;
   std::vector<IrradianceMap> irradiance_maps = {};  ///< Light that was traced to surfaces through the region.
   /// The same for surfaces without a map; each sample uses one of the passes. Null or without passes: none.
@@ -94,8 +92,8 @@ struct FirstSurface {
   Eigen::Vector3f albedo = Eigen::Vector3f::Zero();     ///< In the working space, as denoisers expect it.
 };
 
-/// What the region does to the light of a ray that leaves the camera; means over the bands that it follows, of which
-/// those that do not arrive count as 0.
+/// What the region does to the light of a ray of the camera; means over its bands, where those that do not arrive are
+/// 0.
 struct BentView {
   double radiance_scale = 1;  ///< Of radiance.
   double deflection = 0;      ///< Angle by which light turns, radians.
@@ -126,16 +124,15 @@ class RayShader {
   RayShader(RayShader&&) noexcept;
   ~RayShader();
 
-  /// Sets `radiance`, `layer` and `view` of each of `rays`: its result depends on that ray alone. The mean of the
-  /// estimate is exact, apart from clamping.
+  /// Sets `radiance`, `layer` and `view` of each of `rays`: depends on that ray alone. Its mean is exact, but for
+  /// clamping.
   /// @param show_background  False: a ray that meets nothing sees no light.
   void shade(const std::vector<ViewRay>& rays, bool show_background);
 
   /// In every band.
   Eigen::ArrayXXd::ConstColXpr radiance(std::size_t ray) const { return layer(ray, -1); }
 
-  /// Parts of `radiance`: if there are ShadedScene::irradiance_maps or photons, what these have lit; then the light of
-  /// each group.
+  /// Parts of `radiance`: what irradiance_maps and photons have lit, if there are any; then the light of each group.
   Eigen::ArrayXXd::ConstColXpr layer(std::size_t ray, int layer) const;
 
   const RayView& view(std::size_t ray) const;

@@ -12,8 +12,8 @@
 namespace tensorray {
 
 /// A smooth spectrum, scale · σ(c₀ + c₁ x + c₂ x²), with the sigmoid σ(y) = ½ + y / (2 √(1 + y²)) and the wavelength
-/// mapped to x (Jakob and Hanika 2019, "A Low-Dimensional Function Space for Efficient Spectral Upsampling"). Its
-/// values are within [0, scale].
+/// mapped to x (Jakob and Hanika 2019, "A Low-Dimensional Function Space for Efficient Spectral Upsampling"). Within
+/// [0, scale].
 struct ReflectanceSpectrum {
   std::array<double, 3> coefficients{};
   double scale = 1;

@@ -66,8 +66,7 @@ std::vector<double> knots(const Spectrum& light, double min, double max) {
 }
 
 /// Integrates exactly over [min, max]: between knots the product of light and observer is quadratic, so that two Gauss
-/// points suffice. They lie inside the intervals; therefore jumps at the ends of the light and of the observer do no
-/// harm.
+/// points suffice. They lie inside the intervals: jumps at the ends do no harm.
 Amount integrate(const Spectrum& light, double min, double max) {
   Amount sum;
   const std::vector<double> ends = knots(light, min, max);

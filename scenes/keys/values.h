@@ -87,8 +87,7 @@ inline Limits endings(std::vector<std::string> allowed) {
   return limits;
 }
 
-/// Names in scene files for the values of an enumeration, in its order. `words(Enum{})` returns them; its argument only
-/// selects the overload.
+/// Names in scene files for the values of an enumeration, in its order. `words(Enum{})` returns them.
 using Words = std::vector<const char*>;
 
 /// The same as pairs. An enumeration whose names are listed in another order has `choices(Enum{})` instead of `words`.
