@@ -98,9 +98,8 @@ OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
   if (status.type() == fs::file_type::none && !is_loop)
     fail(target_, fmt::format("cannot be written: {}", error.message()));
   if (fs::is_directory(status) || !target_.has_filename()) fail(target_, "is a folder; give the name of a file");
-  if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0) {
+  if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0)
     fail(target_, fmt::format("cannot be written: {}", std::strerror(errno)));
-  }
   const int own = fs::exists(status) ? own_descriptor(target_) : -1;
   if (own >= 0 && (fcntl(own, F_GETFL) & O_ACCMODE) == O_RDONLY) fail(target_, "is not open for writing");
   is_device_ = own >= 0 || (fs::exists(status) && !fs::is_regular_file(status));

@@ -128,11 +128,10 @@ class SampleView {
     std::vector<Span> spans;
     for (std::size_t band = 0; band < view_.spans.size(); ++band) {
       const std::vector<Span>& parts = view_.parts[band];
-      if (!parts.empty() && is_torn(view_.spans[band])) {
+      if (!parts.empty() && is_torn(view_.spans[band]))
         spans.insert(spans.end(), parts.begin(), parts.end());
-      } else {
+      else
         spans.push_back(view_.spans[band]);
-      }
     }
     return spans;
   }

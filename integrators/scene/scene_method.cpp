@@ -121,9 +121,8 @@ void report(const FieldRegion& region, const ObjectScene& loaded, Render& result
   statistics.positions = region.ways();
   statistics.emitted = {region.ways()};
   statistics.ends.assign(1, EndCounts{});
-  for (int end = 0; end < ray_end_count; ++end) {
+  for (int end = 0; end < ray_end_count; ++end)
     statistics.ends[0][static_cast<std::size_t>(end)] = region.ways(static_cast<RayEnd>(end));
-  }
   if (region.limited() * 1000 > statistics.positions)
     result.warnings.push_back(
         fmt::format("the field increases radiance by more than `integrator.max_gain` ({:g}) on {:.2g}% of the ways "

@@ -217,6 +217,10 @@ DisplayEncoding encoding_of(const OCIO::Config& config, const std::string& displ
 
 }  // namespace
 
+const char* const builtin_color_config =
+#include "renderer/color/builtin_config.inc"
+    ;
+
 const char* const builtin_config_word = "built-in";
 
 const char* const soft_highlights_view = "Soft highlights";

@@ -65,10 +65,9 @@ void check(const GridSettings& grid) {
   if (n.minCoeff() < 1) throw std::invalid_argument("`resolution` must be at least 1 on every axis");
   if (((grid.max - grid.min).array() == 0 && n.array() > 1).any())
     throw std::invalid_argument("`resolution` must be 1 on an axis where `min` and `max` are equal");
-  if (n.cast<double>().prod() > voxel_limit) {
+  if (n.cast<double>().prod() > voxel_limit)
     throw std::invalid_argument(
         fmt::format("`resolution` asks for {} x {} x {} voxels, more than 2^31; ask for fewer", n.x(), n.y(), n.z()));
-  }
 }
 
 }  // namespace
@@ -85,13 +84,12 @@ const Json* SectionReader::find(const char* key) {
 std::string SectionReader::pointer_to(const std::string& key) const {
   std::string pointer = pointer_ + "/";
   for (const char c : key) {  // Escapes of RFC 6901.
-    if (c == '~') {
+    if (c == '~')
       pointer += "~0";
-    } else if (c == '/') {
+    else if (c == '/')
       pointer += "~1";
-    } else {
+    else
       pointer += c;
-    }
   }
   return pointer;
 }
@@ -287,11 +285,10 @@ GridSettings choose_grid(const Generator& generator, const GridRequest& request)
   GridSettings grid = default_grid(generator, std::max(longest, 2));  // With one voxel the box would have no extent.
   if (request.min) grid.min = *request.min;
   if (request.max) grid.max = *request.max;
-  if (each) {
+  if (each)
     grid.resolution = *each;
-  } else if (request.min || request.max || longest == 1) {
+  else if (request.min || request.max || longest == 1)
     grid.resolution = cubic_resolution(grid.max - grid.min, longest);
-  }
   check(grid);
   return grid;
 }

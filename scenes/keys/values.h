@@ -185,9 +185,8 @@ struct Value<Eigen::Matrix<Scalar, size, 1>> {
       return true;
     }
     if (!json.is_array() || json.size() != size) return false;
-    for (int i = 0; i < size; ++i) {
+    for (int i = 0; i < size; ++i)
       if (!Value<Scalar>::read(json[static_cast<std::size_t>(i)], each, target[i])) return false;
-    }
     // The square must neither vanish nor overflow, because the vector will be normalised.
     const double square = target.template cast<double>().squaredNorm();
     return !limits.not_zero || (std::isnormal(square) && square > 0);

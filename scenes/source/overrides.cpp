@@ -24,11 +24,10 @@ struct Override {
 std::vector<std::string> split(const std::string& key) {
   std::vector<std::string> segments(1);
   for (const char c : key) {
-    if (c == '.') {
+    if (c == '.')
       segments.emplace_back();
-    } else {
+    else
       segments.back() += c;
-    }
   }
   return segments;
 }
@@ -95,11 +94,10 @@ void remove(Json& scene, const Override& change) {
     }
   }
   const std::string& last = change.segments.back();
-  if (parent->is_object()) {
+  if (parent->is_object())
     parent->erase(last);
-  } else if (parent->is_array() && index_in(*parent, last, change) < parent->size()) {
+  else if (parent->is_array() && index_in(*parent, last, change) < parent->size())
     parent->erase(std::stoul(last));
-  }
 }
 
 /// The value of a key that is named as "light.direction" or "objects.0.plate"; null if the scene does not give it.
