@@ -8,7 +8,6 @@
 
 #include <Eigen/Geometry>
 
-#include "base/geometry/ply_writer.h"
 #include "base/geometry/triangle_mesh.h"
 
 namespace tensorray {
@@ -40,7 +39,7 @@ MeshWithNormals read_mesh_with_normals(const std::filesystem::path& path, std::o
 MeshWithNormals with_smooth_normals(const TriangleMesh& mesh, double angle);
 
 /// Writes a mesh in the format that the ending of `path` names. It writes in place and in pieces.
-/// - `.ply`: as base/geometry/ply_writer.h.
+/// - `.ply`: as base/geometry/triangle_mesh.h.
 /// - `.obj`: text; "v x y z" (with "r g b" from 0 to 1, which most programs read), "vn", "f a//a".
 /// Both formats keep positions in single precision, with the fewest digits that reproduce them (seven to nine). In
 /// .obj, colours have three decimals and normals four: the eye sees no finer difference. Only .ply keeps values.

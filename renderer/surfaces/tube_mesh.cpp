@@ -12,7 +12,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
-#include "base/geometry/turn.h"
+#include "base/geometry/box.h"
 #include "renderer/surfaces/polyline.h"
 
 namespace tensorray {

@@ -1,4 +1,4 @@
-#include "base/geometry/ply_writer.h"
+#include "base/geometry/triangle_mesh.h"
 
 #include <fstream>
 #include <iterator>

@@ -1,4 +1,4 @@
-#include "base/geometry/turn.h"
+#include "base/geometry/box.h"
 
 #include <cmath>
 
