@@ -19,8 +19,8 @@ bool is_device(const std::filesystem::path& path);
 
 /// Compares files by device and inode, after following links. A file that does not exist yet is compared by its folder
 /// and name. Several outputs may go to the same device or pipe, one after the other.
-/// @throw std::invalid_argument naming both files, if an output is also an input or another output; or an input a
-/// device.
+/// @throw std::invalid_argument that names both files, if an output is the same file as an input or another output; or
+/// if an input is a device.
 void require_distinct_files(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);
 
 }  // namespace tensorray

@@ -8,8 +8,7 @@
 namespace tensorray {
 
 /// `bytes` as valid UTF-8. Bytes that are no UTF-8 become characters that no name has for another reason, U+F700 and
-/// the byte, from Unicode's private use area; UTF-8 stays as it is. Characters of that kind in `bytes` are written byte
-/// by byte, too, so that each text has one meaning.
+/// the byte, from Unicode's private use area; UTF-8 stays as it is. Those in `bytes` are written byte by byte, too.
 std::string utf8_of(const std::string& bytes);
 
 /// The bytes that utf8_of was given. Any other text stays as it is.

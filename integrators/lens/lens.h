@@ -54,7 +54,7 @@ struct TraceCounts {
 class LensMap {
  public:
   /// @param surfaces   Bounds, cut and obstacles; its plate is not used.
-  /// @param direction  Of the light, unit, from one plane to the other. @param field  Must outlive the map.
+  /// @param direction  Direction of the light, unit, from one plane to the other. `field` must outlive the map.
   /// @throw std::runtime_error if Embree fails.
   LensMap(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending, const Plate& from,
           const Plate& to, const Eigen::Vector3d& direction);
@@ -127,8 +127,8 @@ struct LensSettings {
   Job* job = nullptr;  ///< As FlowSettings has it; its ranks draw the light together, too. That of a shard cannot be
                        ///< drawn.
 
-  /// Called after each division of the map's quads; `so_far` gives light that this process alone can draw. May be
-  /// empty.
+  /// Called after each division of the map's quads, with a function that gives the light so far, which this process
+  /// alone can draw. Empty: nobody wants it.
   std::function<void(const std::function<const LensLight&()>& so_far)> show;
 };
 

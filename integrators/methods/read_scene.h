@@ -32,8 +32,7 @@ struct SceneChanges {
 bool is_field_file(const std::filesystem::path& path);
 
 /// Reads a scene file: JSON with comments; of a field's file, which is not opened, it makes a scene of defaults.
-/// Relative paths in it are relative to the scene file's folder. If no output file is named, `image` and `exr` are
-/// files beside the scene file, with its name and .png and .exr.
+/// Relative paths in it are relative to the scene file's folder. Without outputs, `image` and `exr` have its name.
 /// @throw SceneError: the file is unreadable or not JSON; a key is unknown (with the nearest valid one), missing, of
 /// the wrong type or out of range; two keys exclude each other.
 SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes = {});

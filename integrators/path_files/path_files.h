@@ -23,8 +23,8 @@
 namespace tensorray {
 
 /// Writes the file in place, in the order of `paths`. Paths without points, which other programs refuse, are left out.
-/// @throw std::invalid_argument on another ending; std::runtime_error naming the file and the reason (a full disk,
-/// too).
+/// @throw std::invalid_argument on another ending; std::runtime_error naming the file and the reason (also when the
+/// disk is full).
 void write_paths(const std::filesystem::path& path, const std::vector<Path>& paths);
 
 /// Whether a file with this ending holds the tensors of the points.
@@ -38,8 +38,7 @@ bool stores_tensors(const std::filesystem::path& path);
 std::vector<Path> read_paths(const std::filesystem::path& path);
 
 /// A path of which only the positions are known. Of points that coincide, one is kept. Directions, lengths and V' are
-/// computed from the polyline (second order where points are dense); T = 0; all points are in the field. Empty without
-/// two points.
+/// computed from the polyline (second order where points are dense); T = 0; all are in the field. Empty without two.
 PathPoints bare_way(const std::vector<Eigen::Vector3d>& positions);
 
 // One format each:

@@ -30,8 +30,8 @@ std::vector<Light> default_lights(const Scene& scene, const ShownLight& shown) {
   return {ConstantLight{shown.radiance(sky_color, sky_strength)}, sun};
 }
 
-/// All surfaces that stop light on its way to object `receiver`, and it itself, if it is no plate. Paths do not stop
-/// light.
+/// All surfaces that stop light on its way to object `receiver`, and the object itself, if it is no plate. Paths show
+/// light, and do not stop it.
 Surfaces surfaces_before(const LitObjects& lit, std::size_t receiver) {
   const std::vector<ShadedSurface>& all = lit.surfaces.surfaces();
   Surfaces surfaces;

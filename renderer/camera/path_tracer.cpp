@@ -20,8 +20,8 @@ using Eigen::Vector2d;
 
 constexpr int tile_size = 16;    ///< Pixels.
 constexpr int neighborhood = 2;  ///< Pixels in each direction that help decide whether a pixel is done.
-/// Samples that are shaded together. Where light bends, their rays fill packets; otherwise they should stay in the
-/// first cache.
+/// Samples that are shaded together. Where light bends, their rays fill packets; otherwise, all that is known of them
+/// should stay in the cache of the first level.
 constexpr std::size_t bent_batch = 256, straight_batch = 32;
 constexpr double round_seconds = 15;    ///< After which ranks give their tiles to the root.
 constexpr double min_luminance = 0.05;  ///< To which errors are compared; fraction of the picture's mean.

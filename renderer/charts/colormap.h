@@ -8,9 +8,8 @@
 
 namespace tensorray {
 
-/// Colour maps in which equal steps of the value look equally large. In the sequential maps lightness increases from
-/// end to end, so that they also work when printed in grey. They interpolate 8-bit control points of the published
-/// tables:
+/// Colour maps in which equal steps of the value look equally large. In sequential maps lightness increases, so that
+/// they also work in grey. Each map interpolates control points of the published table, rounded to 8 bits:
 /// - `viridis`, `magma`, `inferno`, `plasma` (dark to light): S. van der Walt and N. Smith 2015, CC0, as in matplotlib.
 /// - `cividis` (blue to yellow, the same to readers with a colour vision deficiency): J. Nuñez, C. Anderton and
 ///   R. Renslow, Optimizing colormaps with consideration for color vision deficiency, PLOS ONE 13(7), 2018.
@@ -40,8 +39,8 @@ struct ValueRange {
   double high = 1;           ///< > low.
   bool logarithmic = false;  ///< Equal ratios of values, not equal differences, have equal distances; low > 0.
 
-  /// Where a value lies in the range: 0 at `low`, 1 at `high`, clamped. NaN, and what has no logarithm if wanted, give
-  /// 0.
+  /// Where a value lies in the range: 0 at `low`, 1 at `high`, clamped. NaN gives 0; on a logarithmic scale a value
+  /// without logarithm also gives 0.
   double position(double value) const;
 
   /// The value at a position from 0 to 1.

@@ -28,8 +28,8 @@ Eigen::Vector3d xyz_of(const Eigen::Vector2d& chromaticity);
 /// From linear RGB to XYZ; RGB (1, 1, 1) becomes the white with Y = 1.
 Eigen::Matrix3d rgb_to_xyz(const Chromaticities& colors);
 
-/// Bradford's chromatic adaptation from one white to another (XYZ, Y = 1). Empty if `from` is too saturated: a cone
-/// sees 1% of `to`.
+/// Bradford's chromatic adaptation from one white to another (XYZ, Y = 1). Empty if `from` is too saturated for it: a
+/// cone response is below 1% of that of `to`.
 std::optional<Eigen::Matrix3d> adaptation(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 /// The published chromaticities of a space (Rec. 709 and 2020, P3-D65, Adobe RGB, ACEScg, ACES2065-1), each with its

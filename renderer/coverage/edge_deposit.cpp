@@ -29,7 +29,7 @@ using Planes = hn::CappedTag<double, DepositPlanes::count>;
 using PlaneSums = hn::RebindToSigned<Planes>;
 
 /// Adds to the pixels `at` and behind it the differences of what is covered of each and of the one before it, as
-/// integers, which cancel.
+/// integers: equal ones cancel.
 template <std::size_t count>
 HWY_INLINE void add_covered(const double (&covered)[count], double before, const double* plane_weights,
                             std::uint64_t* at) {

@@ -38,8 +38,7 @@ struct DensitySettings {
 /// that of the spline is ⅓ wherever the photon is. The error is at most 1e-3 of the peak of the kernel at τ = 2, and
 /// falls with τ⁴. For a smaller τ the Gaussian itself is added, at the middles of the pixels. Both end at 4.5 τ.
 ///
-/// Sums are integers, in units of 2^-34 of a photon: they do not depend on the order of the photons, and sums of parts
-/// of the photons can be added. A pixel has room for 2^29 photons.
+/// Sums are integers, in units of 2^-34 of a photon: in any order, and of parts. A pixel has room for 2^29 photons.
 class DensityEstimator {
  public:
   /// @param colors  One colour per channel, or empty.
@@ -55,8 +54,8 @@ class DensityEstimator {
   ///              not finite count as 0.
   void add(int channel, const Eigen::Vector2d& at, const Eigen::Matrix2d& axes = Eigen::Matrix2d::Zero());
 
-  /// Writes the sums so far, or adds others; not while photons are added. @throw DamagedArchive if there are not so
-  /// many.
+  /// Writes the sums so far, or adds those of other photons; not while photons are added. @throw DamagedArchive if
+  /// there are not so many.
   void copy_sums(Archive& archive);
 
   /// Returns weight per pixel. @param weight  The weight of one photon. Runs on all threads.

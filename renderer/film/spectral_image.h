@@ -13,8 +13,7 @@
 namespace tensorray {
 
 /// Converts a film whose channel k is `bands[k]` to colours relative to the undisturbed beam (1: undisturbed). The
-/// picture has the channels R, G, B; each pixel is `xyz_to_rgb` times Σ_k film_k xyz_k. Undisturbed light has Y = 1.
-/// Runs on all threads; the result does not depend on their number.
+/// picture has the channels R, G, B; each pixel is `xyz_to_rgb` times Σ_k film_k xyz_k. Runs on all threads.
 /// @throw std::invalid_argument unless the film has one channel per band.
 Image linear_image(const Film& film, const std::vector<Band>& bands, const Eigen::Matrix3d& xyz_to_rgb);
 

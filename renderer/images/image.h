@@ -52,8 +52,8 @@ std::vector<std::string> image_endings();
 /// picture in parallel.) Do not call it while pictures are read or written.
 void set_image_threads(int threads);
 
-/// Loads what is needed to write the pictures among `files`, so that the first one does not wait. Any thread may call
-/// it.
+/// Loads what is needed to write the pictures among `files`, so that the first one does not wait for it. (EXR and PNG
+/// need nothing.) Any thread may call it.
 void prepare_images(const std::vector<std::filesystem::path>& files);
 
 /// Writes a picture in the format given by the ending of `path`. The same picture always gives the same bytes.

@@ -29,8 +29,8 @@ struct PhotonTracerSettings {
   Job* job = nullptr;  ///< Whose ranks trace the photons together, and which keeps those of each pass; null: alone.
   /// Whether a light lights a surface by photons.
   std::function<bool(int light, std::uint32_t surface)> serves;
-  /// Of surfaces that are rectangles, by their index: photons near an edge are mirrored at it, so that no light is lost
-  /// beyond it.
+  /// Of surfaces that are rectangles, by their index: photons near an edge are mirrored at it, so that the light that
+  /// their radius takes beyond it comes back.
   std::vector<std::optional<Plate>> plates;
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 /// @file renderer/lights/lights.h
-/// The lights of a scene, and how to sample directions towards them. Radiance is given by band, relative to the light
-/// of the bands (Band).
+/// The lights of a scene, and how to sample directions towards them. Radiance is given for each band, relative to the
+/// light that the bands are made from: see Band.
 
 #include <algorithm>
 #include <cstddef>
@@ -87,8 +87,7 @@ struct LightSample {
 
 /// Chooses lights by their power, and then directions by the light. Immutable: any thread may use it.
 ///
-/// Constant light is never chosen: rays in the directions in which a material scatters find it with the least noise,
-/// and all choices are left for the other lights.
+/// Constant light is never chosen: the directions in which a material scatters find it with the least noise.
 ///
 /// Parallel light and points are deltas. All other lights that are infinitely far away form the background. The caller
 /// sees it as one light: its radiance is the sum over these lights, and its density is that of choosing a direction by

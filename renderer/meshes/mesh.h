@@ -21,10 +21,9 @@ struct MeshWithNormals {
 
 /// Reads all meshes of a file as one mesh. Polygons are triangulated, vertices at equal positions are joined, unused
 /// vertices and triangles of zero area are dropped. Positions have the file's precision in .ply, and single precision
-/// in other formats. Formats that say their unit and axes (.gltf, .glb, .dae, .fbx) are read in metres with +z up;
-/// others as they are.
-/// @throw std::runtime_error naming the file and the reason: unreadable, no triangles, a vertex beyond single
-/// precision.
+/// in other formats. Formats with unit and axes (.gltf, .glb, .dae, .fbx) are in metres with +z up.
+/// @throw std::runtime_error naming the file and the reason: missing, unreadable, no triangles, a vertex that is not
+/// finite in single precision.
 TriangleMesh read_mesh(const std::filesystem::path& path);
 
 /// The same mesh for pictures: a vertex is there once for each of its normals.

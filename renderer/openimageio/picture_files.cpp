@@ -25,8 +25,8 @@ OIIO::TypeDesc type_desc(SampleType type) {
   return type == SampleType::uint16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::FLOAT;
 }
 
-/// Whether TIFF and JPEG have a plain field for an attribute. For others OpenImageIO 2.4 writes Exif, but not in memory
-/// for TIFF.
+/// Whether TIFF and JPEG have a plain field for an attribute. For others OpenImageIO 2.4 would write an Exif directory,
+/// which it cannot do in memory for TIFF.
 bool is_plain(const std::string& attribute) {
   static const std::set<std::string> names{"ImageDescription", "Software", "Artist", "Copyright"};
   return names.count(attribute) > 0;
@@ -66,9 +66,8 @@ void require_likely_layout(const OIIO::ImageSpec& spec) {
                              std::to_string(spec.tile_height) + " pixels");
 }
 
-/// Reads channels of a part as `type` into `samples`, which holds them all.
-/// OpenImageIO's reader of TIFF reports success for strips that are cut off or damaged if it reads several at once.
-/// TIFF is therefore read line by line, which takes the same time.
+/// Reads channels of a part as `type` into `samples`, which holds them all. TIFF is read line by line: OpenImageIO does
+/// not notice damage in several strips.
 /// @throw std::runtime_error with the reader's first message. Some readers give none if a file is cut off.
 void read_samples(OIIO::ImageInput& input, int part, int first, int count, OIIO::TypeDesc type, void* samples) {
   const OIIO::ImageSpec spec = input.spec(part, 0);

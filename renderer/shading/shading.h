@@ -42,15 +42,11 @@ struct ShadingSettings {
   DirectLight direct = DirectLight::both;
   int max_depth = 8;  ///< Most surfaces at which a path scatters; >= 0. 1: direct light only.
   /// After this many surfaces, a path that carries less than a tenth of its luminance may end at random (Russian
-  /// roulette); >= 1. With 1, dark surfaces would be noisy under a sky.
+  /// roulette); >= 1. With 1, dark surfaces would be noisy under a sky, whose light only the material's samples find.
   int roulette_depth = 2;
   /// Greatest luminance that light scattered twice or more adds, for each sample and surface; 1 is the luminance of the
-  /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). With the
-  /// default, one such path adds at most 10 / samples to a pixel: at 64 samples 0.16, which is 20 times the
-  /// neighbouring pixels only if these are below 0.008. Light that is scattered once, which lights most of a picture,
-  /// is never changed. Light that many surfaces exchange is rarely changed. A bent path has
-  /// one band: it is limited as if all bands had its radiance, since bright pixels would otherwise stay in bands that
-  /// the eye hardly sees.
+  /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). Light that is
+  /// scattered once is never changed. A bent path is limited as if all bands had its radiance.
   double indirect_clamp = 10;
   /// The angle of a pixel as the camera sees it, radians. Bent rays of the camera may be off by a fifth of it, so that
   /// rays of some bands are interpolated between those of others. 0: the ray of each band is traced.
@@ -92,8 +88,8 @@ struct FirstSurface {
   Eigen::Vector3f albedo = Eigen::Vector3f::Zero();     ///< In the working space, as denoisers expect it.
 };
 
-/// What the region does to the light of a ray of the camera; means over its bands, where those that do not arrive are
-/// 0.
+/// What the region does to the light of a ray that leaves the camera; means over the bands that it follows, of which
+/// those that do not arrive count as 0.
 struct BentView {
   double radiance_scale = 1;  ///< Of radiance.
   double deflection = 0;      ///< Angle by which light turns, radians.
@@ -124,8 +120,8 @@ class RayShader {
   RayShader(RayShader&&) noexcept;
   ~RayShader();
 
-  /// Sets `radiance`, `layer` and `view` of each of `rays`: depends on that ray alone. Its mean is exact, but for
-  /// clamping.
+  /// Sets `radiance`, `layer` and `view` of each of `rays`: its result depends on that ray alone. The mean of the
+  /// estimate is exact, apart from clamping.
   /// @param show_background  False: a ray that meets nothing sees no light.
   void shade(const std::vector<ViewRay>& rays, bool show_background);
 

@@ -163,8 +163,8 @@ double mis_weight_beside_photons(const ShadedScene& scene, const WaitingPath& pa
 
 // direct_light.cpp: light that comes to a surface from lights that it looks for.
 
-/// Samples a light, and adds what the last surface scatters of it. If it comes through the region, a bent path looks
-/// for it.
+/// Samples a light, and adds its light that the last surface of the path scatters. If it would come through the region,
+/// a bent path will look for it.
 /// @param u  In [0, 1)².
 void sample_direct_light(Wavefront& front, PathState& path, const Eigen::Vector2d& u);
 
@@ -205,8 +205,8 @@ struct LightSource {
   const std::vector<float>* radiance = nullptr;  ///< Of the background, in the bands of the path.
 };
 
-/// Adds light that was scattered at `path.depth` surfaces, but no values that overflow: one would make the mean
-/// infinite.
+/// Adds light that was scattered at `path.depth` surfaces. Leaves out values that overflow, since one would make the
+/// mean infinite.
 /// @param light  In the bands of the path; changed if it is limited (ShadingSettings::indirect_clamp).
 void add_light(Wavefront& front, const PathState& path, BandValues& light, const LightSource& source);
 

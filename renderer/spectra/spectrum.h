@@ -50,10 +50,10 @@ struct Band {
   Eigen::Vector3d xyz = Eigen::Vector3d::Zero();
 };
 
-/// Divides [min, max] into `count` equal bands. Power and colour are exact integrals. min == max is monochromatic (1
-/// nm).
-/// @throw std::invalid_argument if count < 1, min <= 0, min > max, min == max with count > 1, or there is no visible
-/// light.
+/// Divides [min, max] into `count` equal bands. Their power and colour are exact integrals. min == max with count == 1
+/// is monochromatic light (width 1 nm).
+/// @throw std::invalid_argument if count < 1, min <= 0, min > max, min == max with count > 1, or the light has no
+/// power, or no visible power, in [min, max].
 std::vector<Band> make_bands(const Spectrum& light, double min, double max, int count);
 
 }  // namespace tensorray

@@ -12,8 +12,7 @@
 namespace tensorray {
 
 /// A latitude-longitude picture, as seen from inside. In its own frame +z is up: the upper edge is +z and the lower
-/// edge −z. The middle of the picture is +x; a quarter of its width to the left is +y, to the right −y. The edges meet
-/// at −x.
+/// edge −z. The middle of the picture is +x; a quarter of its width to the left is +y. The edges are −x.
 struct EnvironmentLight {
   Image picture;                    ///< Any channels, scene-linear. Values that are negative or not finite count as 0.
   Eigen::MatrixXf channel_spectra;  ///< Bands × channels: the radiance in each band of a channel with value 1; >= 0.

@@ -56,10 +56,9 @@ void convert(const NativeImage& image, const ColorConversion& conversion, int co
 ///
 /// Levels of R, G, B, A with the colours multiplied by alpha. Level 0 is the picture. Each further level has half the
 /// width and height (rounded down, at least 1); the last level is a single pixel. A pixel of a level is the exact mean
-/// over its area for any size of the picture, so that no level aliases and all levels have the same mean. Memory: 21
-/// bytes for each pixel of a picture of up to 16 million pixels, of which all levels are stored. Of a larger one, the
-/// picture as its file stores it, whose pixels are converted when they are read, and 5 bytes for each pixel, which its
-/// other levels take. Levels are made on all threads. Immutable.
+/// over its area for any size of the picture. Memory: 21 bytes for each pixel of a picture of up to 16 million pixels,
+/// of which all levels are stored. Of a larger one, the picture as its file stores it, whose pixels are converted when
+/// they are read, and 5 bytes for each pixel, which its other levels take. Levels are made on all threads. Immutable.
 class ImagePyramid {
  public:
   /// @param conversion  From the colours of the picture to scene-linear colours.

@@ -25,8 +25,7 @@ void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* poin
                   const SceneSource& source);
 
 /// @throw SceneError if `bytes`, and what the program takes, are more than this process may have (memory_limit).
-/// Estimates are within a third of what large pictures were measured to take
-/// (Limits.EstimatesOfMemoryAreNearWhatIsMeasured).
+/// Estimates are within a third of what large pictures take.
 /// @param what  The keys that need the memory, for the message.
 void check_memory(double bytes, const std::string& what, const SceneSource& source);
 

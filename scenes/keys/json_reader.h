@@ -10,8 +10,8 @@
 
 namespace tensorray {
 
-/// The scene file is wrong. The message is one line: what, where (file and JSON pointer, or line and column), and the
-/// fix.
+/// The scene file is wrong. The message is one line: what is wrong, where (file and JSON pointer, or line and column),
+/// and the fix.
 struct SceneError : std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
@@ -36,8 +36,8 @@ using Json = nlohmann::ordered_json;
 constexpr int nesting_limit = 64;
 
 /// Reads a file that contains one JSON object; comments are allowed.
-/// @throw SceneError: the file is missing, a folder, unreadable, empty, too large, not JSON (with line and column), no
-/// object.
+/// @throw SceneError: the file is missing, a folder, unreadable, empty, too large, not JSON (with line and column), or
+/// its value is not an object.
 Json read_json_object(const std::filesystem::path& path);
 
 /// Reads JSON without comments.

@@ -81,8 +81,8 @@ struct Render {
 /// Adds the steps and samples of the other ranks, at the root. @throw as Ranks::gather.
 void gather_counts(Ranks* ranks, Statistics& statistics);
 
-/// A render whose work is kept, and may be divided. If it is cancelled while tiles are rendered, the result is what
-/// there is.
+/// A render whose work is kept, and may be divided. Where Progress is cancelled while tiles are rendered, the work
+/// stops, and the result is what there is.
 struct RenderJob : Job {
   using Job::Job;
 
@@ -93,8 +93,8 @@ struct RenderJob : Job {
   bool takes_picture_request() { return show && is_root(ranks) && picture_wanted.exchange(false); }
 };
 
-/// Renders the scene with its method. @param job  Null: nothing is kept. The root has the result; that of a shard is in
-/// the job.
+/// Renders the scene with its method. @param job  Null: nothing is kept. Of ranks, only the root has the result; a
+/// shard has none: what it makes is in the job.
 /// @throw Cancelled; std::runtime_error; SceneError.
 Render render(const Scene& scene, const Progress& progress, RenderJob* job = nullptr);
 

@@ -91,10 +91,10 @@ std::string field_key(const SceneDescription& description);
 std::optional<LoadedField> field_of(const std::optional<Scene>& before, const SceneDescription& description);
 
 /// SceneDescription → Scene: loads fields, meshes and spectra, and chooses all values that the scene leaves open.
-/// @param field  A field in memory; only `scale` and `bounds` of `description.field` are then used. Nothing: it is
-/// loaded.
-/// @throw std::runtime_error naming the file and the fix; SceneError if a value does not fit the loaded data;
-/// Cancelled.
+/// @param field  A field that is in memory; then only `scale` and `bounds` of `description.field` are used. Nothing:
+/// the field of the description is loaded.
+/// @throw std::runtime_error, one line that names the file and the fix; SceneError if a value of the scene does not fit
+/// the loaded data; Cancelled.
 Scene load_scene(SceneDescription description, const Progress& progress, std::optional<LoadedField> field = {});
 
 /// The surface of a field's body, as what cuts the volume. @param source  Names the field in errors.

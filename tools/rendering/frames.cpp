@@ -61,8 +61,7 @@ class Sequence {
   }
 
   /// What the frames have in common: the scale and the direction, where scenes leave them open. They are those of the
-  /// first frame; where the run keeps going, of the first one that can be loaded, or nothing if none can: each then
-  /// fails when its turn comes.
+  /// first frame; where the run keeps going, of the first one that can be loaded, if any.
   Json common_values(const std::vector<int>& frames) {
     for (const int frame : frames) {
       try {

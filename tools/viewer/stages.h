@@ -60,9 +60,8 @@ std::vector<std::filesystem::path> outputs_of(const SceneDescription& descriptio
 /// - what "auto" chose for scale and direction, while `field` (but `scale`), `light.direction` and `light.up` stay;
 /// - the rays of the light on a plate, up to where they leave the volume, while `field`, `bending` and the direction of
 ///   the light stay;
-/// - the picture in linear light, while `output` changes only in `exposure`, `display` and `view`.
-/// Each picture is the same, bit for bit, as if its scene were loaded and rendered from the beginning. One thread at a
-/// time may use it.
+/// - the picture in linear light, while `output` changes only in `exposure`, `display` and `view`. Each picture is the
+/// same, bit for bit, as if rendered from the beginning. One thread at a time may use it.
 class LiveScene {
  public:
   /// @param file  The scene's file; its folder is that of relative paths.
