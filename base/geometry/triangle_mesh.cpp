@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-#include "base/files/file_in_pieces.h"
+#include "base/files/output_file.h"
 #include "base/text/byte_order.h"
 
 namespace tensorray {

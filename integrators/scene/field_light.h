@@ -10,7 +10,7 @@
 #include "base/process/progress.h"
 #include "integrators/path_tracing/load_paths.h"
 #include "integrators/scene/scene_method.h"
-#include "renderer/light_maps/irradiance_map.h"
+#include "renderer/light_maps/photon_map.h"
 #include "renderer/light_maps/photon_tracer.h"
 #include "renderer/lights/lights.h"
 #include "renderer/materials/material.h"

@@ -9,7 +9,6 @@
 #include "base/process/seconds.h"
 #include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
-#include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "scenes/jobs/work_file.h"

@@ -5,7 +5,6 @@
 
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
-#include "python/module/module.h"
 #include "scenes/source/overrides.h"
 
 namespace tensorray {

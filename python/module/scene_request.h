@@ -80,4 +80,11 @@ Enum value_of(const std::string& argument, const std::string& word) {
   return value;
 }
 
+// The parts of the module tensorray._tensorray, one a source file:
+
+void add_fields(pybind11::module_& module);         ///< Field and its functions.
+void add_scene_request(pybind11::module_& module);  ///< SceneRequest.
+void add_renders(pybind11::module_& module);        ///< `render` with its result, and the functions for shards.
+void add_traces(pybind11::module_& module);         ///< `trace` and `landings`.
+
 }  // namespace tensorray

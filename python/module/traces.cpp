@@ -12,7 +12,6 @@
 
 #include "base/errors.h"
 #include "python/module/arrays.h"
-#include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "renderer/meshes/mesh.h"

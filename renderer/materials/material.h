@@ -5,9 +5,8 @@
 #include <optional>
 #include <variant>
 
+#include "renderer/materials/metal_and_glass.h"
 #include "renderer/materials/principled.h"
-#include "renderer/materials/rough_conductor.h"
-#include "renderer/materials/rough_dielectric.h"
 #include "renderer/materials/scattering.h"
 
 namespace tensorray {

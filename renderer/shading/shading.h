@@ -13,7 +13,6 @@
 
 #include <Eigen/Core>
 
-#include "renderer/light_maps/irradiance_map.h"
 #include "renderer/light_maps/photon_map.h"
 #include "renderer/lights/bending_region.h"
 #include "renderer/lights/lights.h"

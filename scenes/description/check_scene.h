@@ -2,7 +2,7 @@
 /// @file scenes/description/check_scene.h
 /// Checks rules between several values of a scene file. The limits of each single value are checked by the reader.
 
-#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
 #include "scenes/description/description.h"
 
 namespace tensorray {

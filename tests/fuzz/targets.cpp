@@ -23,7 +23,6 @@
 #include "renderer/spectra/spectrum.h"
 #include "scenes/jobs/work_file.h"
 #include "scenes/keys/json_reader.h"
-#include "scenes/source/frames.h"
 #include "scenes/source/overrides.h"
 #include "tests/fuzz/view_targets.h"
 #include "tools/import/cases/ensight.h"

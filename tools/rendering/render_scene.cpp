@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "base/errors.h"
-#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
 #include "base/process/seconds.h"
 #include "base/text/path_text.h"
 #include "base/text/text.h"
@@ -15,7 +15,7 @@
 #include "scenes/description/check_scene.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/scene/render.h"
-#include "scenes/source/frames.h"
+#include "scenes/source/overrides.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"

@@ -20,7 +20,6 @@
 #include <unistd.h>
 
 #include "base/files/descriptor.h"
-#include "base/files/distinct_files.h"
 #include "base/files/output_file.h"
 #include "base/files/temporary_folder.h"
 #include "base/process/progress.h"
