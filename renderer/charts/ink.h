@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/charts/ink.h
-/// Draws lines and areas of one colour over pictures, anti-aliased.
+/// Draws lines, grids and areas of one colour over pictures, anti-aliased.
 
 #include <algorithm>
 #include <vector>

@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/materials/metal_and_glass.h
-/// Metals with a complex index of refraction and a rough surface.
+/// Rough surfaces of metals, with a complex index of refraction, and of glass and similar materials.
 
 #include <string>
 #include <vector>
@@ -49,8 +49,6 @@ double evaluate(const ConductorScattering& metal, const BandsIn& reflectance, co
 /// Samples a direction wi. It may be below the surface, where nothing is reflected.
 /// @param u  In [0, 1)².
 Eigen::Vector3d sample(const ConductorScattering& metal, const Eigen::Vector3d& wo, const Eigen::Vector2d& u);
-
-// Glass and similar materials: a rough surface that reflects and refracts.
 
 struct RoughDielectric {
   double roughness = 0.1;  ///< 0 to 1; values below min_roughness count as min_roughness.

@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/sampling/sampling.h
-/// Low-discrepancy numbers for the dimensions of a light path, and warps from the unit square to other domains.
+/// Low-discrepancy numbers for a light path, warps from the unit square to other domains, and discrete distributions.
 /// Everything here is a pure function, or belongs to one thread.
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 #pragma once
 /// @file scenes/source/overrides.h
-/// Keys by their names, as "light.photons": changes to a scene from the command line, and values in captions.
+/// Changes to a scene before it is read: keys by their names, as "light.photons", from the command line; keyframes, and
+/// numbers in file names, from frame to frame.
 
 #include <string>
 #include <vector>
@@ -20,8 +21,6 @@ void apply_override(Json& scene, const std::string& text);
 /// commas. Keys are named as by --set.
 /// @throw SceneError if the scene does not give such a key, or a brace has no partner.
 std::string with_values(const std::string& caption, const Json& scene, const SceneSource& source);
-
-// Scenes that change from frame to frame: keyframes, and numbers in file names.
 
 /// The frames of "7", "1-240", "1-240x2" (every second one), or of a list of these, "1,3,7-9": in this order, each
 /// once; from 0 to 10^9.

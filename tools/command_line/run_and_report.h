@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/command_line/run_and_report.h
-/// Reports errors to the user: one line, and an exit status.
+/// How the programs end: errors as one line and an exit status, and signals.
 
 #include <exception>
 #include <functional>

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/viewer/stages.h
-/// What a page may ask for, and the pictures that it gets of one scene: coarse ones first.
+/// What a page may ask for, the pictures that it gets of one scene, coarse ones first, and what stays valid of them.
 
 #include <deque>
 #include <filesystem>
