@@ -87,8 +87,6 @@ std::filesystem::path behind_links(const std::filesystem::path& target);
 /// @throw std::runtime_error naming the file, for example because the disk is full. The old file is then unchanged.
 void replace_file(const std::filesystem::path& file, const std::vector<std::string_view>& pieces);
 
-// Large files, written in large pieces.
-
 /// A file to which bytes are appended. Memory does not grow with the file.
 class FileInPieces {
  public:
@@ -120,8 +118,6 @@ class FileInPieces {
   std::ofstream file_;
   std::string piece_;
 };
-
-// Checks that a run does not overwrite one of its inputs, or write two outputs into one file.
 
 /// A file that a run reads or writes.
 struct NamedFile {

@@ -47,8 +47,6 @@ void draw_stroke(Image& image, const Eigen::Vector2d& from, const Eigen::Vector2
 /// The picture may be scene-linear or display-referred; 1 is taken as white.
 bool is_light(const Image& image, const Eigen::AlignedBox2d& box);
 
-// Draws grid lines over a picture, straight or bent by a lens.
-
 /// The texture coordinates that are seen at a pixel's centre, and their derivatives.
 struct PixelCoordinates {
   bool valid = false;                                   ///< Whether the pixel sees anything.

@@ -27,8 +27,6 @@ int run_and_report(const std::function<void()>& work);
 /// no more memory than there is, and prints an error without the program's name.
 int answer_parent(const std::function<void()>& work);
 
-// How the programs handle signals.
-
 /// Makes SIGINT (Ctrl-C) and SIGTERM cancel the returned progress, which lives as long as the program. A second
 /// signal ends the program at once. Broken pipes and file-size limits become errors of the write that meets them.
 Progress& progress_until_interrupted();

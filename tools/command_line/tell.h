@@ -27,8 +27,6 @@ void tell(const std::vector<std::string>& lines, bool quiet);
 /// Prints a line on standard output that says what was made.
 void tell_made(const std::string& line);
 
-// Progress of long work on a terminal: one line that is redrawn, and erased at the end.
-
 /// Becomes the `report` of a Progress until it is destroyed. Draws on standard error, and only if that is a terminal.
 class ProgressBar {
  public:

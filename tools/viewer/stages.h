@@ -53,8 +53,6 @@ Json at_stage(const Json& scene, const SceneDescription& description, const Eige
 std::vector<std::filesystem::path> outputs_of(const SceneDescription& description, const Stage& stage,
                                               const std::filesystem::path& folder);
 
-// A scene whose keys change from picture to picture, and what of its last picture is still valid.
-
 /// Renders one version of a scene after another, and keeps what a change leaves valid:
 /// - the field, while `field` changes only in `scale` and `bounds`;
 /// - what "auto" chose for scale and direction, while `field` (but `scale`), `light.direction` and `light.up` stay;
