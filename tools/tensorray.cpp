@@ -12,7 +12,6 @@
 
 #include "base/process/child_program.h"
 #include "renderer/meshes/mesh_readers.h"
-#include "tools/command_line/interrupts.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/commands/commands.h"

@@ -2,19 +2,19 @@
 
 #include <atomic>
 #include <cerrno>
-#include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <stdexcept>
-#include <string>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/errors.h"
 #include "base/files/descriptor.h"
 #include "base/files/temporary_folder.h"
 #include "base/text/content_hash.h"
@@ -60,8 +60,7 @@ int own_descriptor(fs::path path) {
   return -1;
 }
 
-/// Opens a device. What this process has open gets more bytes where the last ones ended: it may be a file that a shell
-/// has begun.
+/// Opens a device. What this process has open gets bytes where the last ones ended: a shell may have begun it.
 Descriptor open_device(const fs::path& device) {
   const int own = own_descriptor(device);
   return own < 0 ? open_file(device, O_WRONLY) : Descriptor(fcntl(own, F_DUPFD_CLOEXEC, 0));
@@ -91,6 +90,22 @@ bool write_pieces(Descriptor& file, const std::vector<std::string_view>& pieces)
   return ::fsync(file.get()) == 0 && file.close();
 }
 
+namespace fs = std::filesystem;
+
+/// Device, inode and name. A file that exists has an empty name. A file that does not exist has the device and inode of
+/// its folder, and its own name. If its folder does not exist either, device and inode are 0, and the name is the path.
+using Identity = std::tuple<dev_t, ino_t, std::string>;
+
+Identity identity_of(const fs::path& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) == 0) return {status.st_dev, status.st_ino, ""};
+  const fs::path target = fs::absolute(behind_links(path));
+  // The second form is for "none/../file": the folder "none" need not exist.
+  for (const fs::path& each : {target, target.lexically_normal()})
+    if (stat(each.parent_path().c_str(), &status) == 0) return {status.st_dev, status.st_ino, each.filename().string()};
+  return {0, 0, target.lexically_normal().string()};
+}
+
 }  // namespace
 
 OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
@@ -100,9 +115,8 @@ OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
   if (status.type() == fs::file_type::none && !is_loop)
     fail(target_, fmt::format("cannot be written: {}", error.message()));
   if (fs::is_directory(status) || !target_.has_filename()) fail(target_, "is a folder; give the name of a file");
-  if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0) {
+  if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0)
     fail(target_, fmt::format("cannot be written: {}", std::strerror(errno)));
-  }
   const int own = fs::exists(status) ? own_descriptor(target_) : -1;
   if (own >= 0 && (fcntl(own, F_GETFL) & O_ACCMODE) == O_RDONLY) fail(target_, "is not open for writing");
   is_device_ = own >= 0 || (fs::exists(status) && !fs::is_regular_file(status));
@@ -249,6 +263,29 @@ void replace_file(const std::filesystem::path& file, const std::vector<std::stri
   const Descriptor folder = open_file(file.has_parent_path() ? file.parent_path() : ".", O_RDONLY | O_DIRECTORY);
   // Some file systems cannot do this; the name is then safe a little later.
   if (folder.is_open()) static_cast<void>(::fsync(folder.get()));
+}
+
+bool is_device(const fs::path& path) {
+  std::error_code none;
+  return fs::is_other(path, none);
+}
+
+void require_distinct_files(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
+  std::map<Identity, std::string> taken;
+  for (const NamedFile& input : inputs) {
+    if (input.path.empty()) continue;
+    if (is_device(input.path))
+      throw std::invalid_argument(input.name + " (" + input.path.string() +
+                                  ") is a pipe or a device; write what it gives to a file");
+    taken.emplace(identity_of(input.path), input.name);
+  }
+  for (const NamedFile& output : outputs) {
+    if (output.path.empty() || is_device(output.path)) continue;
+    const auto [other, is_new] = taken.emplace(identity_of(output.path), output.name);
+    if (!is_new)
+      throw std::invalid_argument(output.name + " (" + output.path.string() + ") is the same file as " + other->second +
+                                  "; choose another");
+  }
 }
 
 }  // namespace tensorray

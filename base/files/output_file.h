@@ -1,11 +1,15 @@
 #pragma once
 /// @file base/files/output_file.h
-/// Output files that are either complete or absent.
+/// Output files that are either complete or absent, and never those that a run reads.
 
+#include <cstddef>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "base/errors.h"
 
 namespace tensorray {
 
@@ -13,8 +17,7 @@ namespace tensorray {
 /// file at the target stays until then, and stays if the work fails.
 ///
 /// Symbolic links are followed: the link stays, and the file that it points to is replaced. A target that is not a
-/// regular file (a device, a pipe), or that this process has open (/dev/stdout, /dev/fd/3), is never replaced: the
-/// bytes are copied into it.
+/// regular file (a device, a pipe), or that this process has open (/dev/stdout, /dev/fd/3), gets the bytes instead.
 class OutputFile {
  public:
   /// Makes the empty temporary file, so that a target that cannot be written is reported before the work begins.
@@ -80,9 +83,55 @@ std::filesystem::path behind_links(const std::filesystem::path& target);
 /// Writes `pieces`, one after the other, to a file beside it, waits until they are on the disk, and gives them the name
 /// `file`. Whenever the process or the machine stops, `file` is complete: as it was, or as it becomes. The file beside
 /// it, `.tensorray-HASH.new` with a hash of the name, is always the same, so that processes that were killed leave no
-/// more than one; it is not one that a user names. An OutputFile, in contrast, lets two processes write the same target
-/// at once, and follows links.
+/// more than one; it is not one that a user names. An OutputFile, unlike it, follows links.
 /// @throw std::runtime_error naming the file, for example because the disk is full. The old file is then unchanged.
 void replace_file(const std::filesystem::path& file, const std::vector<std::string_view>& pieces);
+
+/// A file to which bytes are appended. Memory does not grow with the file.
+class FileInPieces {
+ public:
+  explicit FileInPieces(const std::filesystem::path& path) : path_(path), file_(path, std::ios::binary) {}
+
+  /// The bytes to append to. Call `end_of_row` now and then.
+  std::string& bytes() { return piece_; }
+
+  /// Writes the bytes if they are enough for a piece.
+  void end_of_row() {
+    constexpr std::size_t piece_size = 1 << 20;
+    if (piece_.size() >= piece_size) flush();
+  }
+
+  /// Writes what is left. @throw std::runtime_error naming the file if any byte could not be written.
+  void close() {
+    flush();
+    file_.close();
+    if (!file_) fail(path_, "cannot be written; check the path and the space on the disk");
+  }
+
+ private:
+  void flush() {
+    file_.write(piece_.data(), static_cast<std::streamsize>(piece_.size()));
+    piece_.clear();
+  }
+
+  std::filesystem::path path_;
+  std::ofstream file_;
+  std::string piece_;
+};
+
+/// A file that a run reads or writes.
+struct NamedFile {
+  std::filesystem::path path;  ///< Empty: no file.
+  std::string name;            ///< How an error names the file: "`/field/file`", "--stats".
+};
+
+/// Whether a path leads to what is neither a file nor a folder: a pipe, a device or a socket. Opening it may never end.
+bool is_device(const std::filesystem::path& path);
+
+/// Compares files by device and inode, after following links. A file that does not exist yet is compared by its folder
+/// and name. Several outputs may go to the same device or pipe, one after the other.
+/// @throw std::invalid_argument that names both files, if an output is the same file as an input or another output; or
+/// if an input is a device.
+void require_distinct_files(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);
 
 }  // namespace tensorray

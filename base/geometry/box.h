@@ -2,6 +2,7 @@
 /// @file base/geometry/box.h
 /// Boxes along the axes, and points.
 
+#include <cmath>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -23,6 +24,25 @@ inline std::vector<Eigen::Vector3d> corners_of(const Eigen::AlignedBox3d& box,
   for (int i = 0; i < 8; ++i)
     corners.push_back(transform * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
   return corners;
+}
+
+// The smallest rotation that turns one direction to another.
+
+/// The smallest rotation of `from` to `to`, of any length; about any axis normal to them if they are opposite.
+/// (Quaternion::FromTwoVectors does the same by a singular value decomposition, which takes seconds to compile.)
+inline Eigen::Quaterniond turn_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const Eigen::Vector3d a = from.normalized(), b = to.normalized();
+  const double cosine = b.dot(a);
+  Eigen::Quaterniond turn;
+  if (cosine < -1 + 1e-12) {
+    turn.vec() = a.unitOrthogonal();
+    turn.w() = 0;
+    return turn;
+  }
+  const double twice = std::sqrt((1 + cosine) * 2);  // Twice the cosine of half of the angle.
+  turn.vec() = a.cross(b) * (1 / twice);
+  turn.w() = twice * 0.5;
+  return turn;
 }
 
 }  // namespace tensorray

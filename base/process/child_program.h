@@ -21,8 +21,7 @@ struct ProgramEnd {
   std::string error;  ///< The program's output to standard error.
 };
 
-/// Names the folder of this project's programs, for a process that is not one of them. Call it before other threads
-/// start work.
+/// Names the folder of this project's programs, for a process that is none of them; before other threads start work.
 void use_programs_in(const std::filesystem::path& folder);
 
 /// The path of a program of this project. The file need not exist.

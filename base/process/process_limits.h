@@ -9,9 +9,8 @@
 
 namespace tensorray {
 
-/// The processors that this process may use, at least 1: those of its affinity, or fewer where a container has a
-/// quota of processor time (cpu.max of cgroups, cpu.cfs_quota_us of their first version); a fraction of a processor
-/// counts as one.
+/// The processors that this process may use, at least 1: those of its affinity, or fewer where a container has a quota
+/// of processor time (cpu.max of cgroups, cpu.cfs_quota_us of their first version), rounded up.
 /// @param root  The root of the file system, for tests.
 unsigned usable_processors(const std::filesystem::path& root = "/");
 
@@ -20,8 +19,7 @@ struct MemoryLimit {
   std::string cause;  ///< What sets it, for a message: "this machine's memory".
 };
 
-/// The least of: the machine's memory and swap, the memory of containers (cgroups), and what the limits of this process
-/// (`ulimit -v`, `ulimit -d`) leave.
+/// The least of: the machine's memory and swap, that of containers (cgroups), and what `ulimit -v` and `-d` leave.
 MemoryLimit memory_limit(const std::filesystem::path& root = "/");
 
 /// Has allocations fail where this process alone would take most of memory_limit(), for programs that read files which

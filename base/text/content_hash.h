@@ -8,8 +8,7 @@
 
 namespace tensorray {
 
-/// The hash of `bytes`, which continue those of which `before` is the hash. The result depends on how the bytes are
-/// divided. Several gigabytes a second.
+/// The hash of `bytes`, which continue those of which `before` is the hash. It depends on how the bytes are divided.
 std::uint64_t content_hash(std::string_view bytes, std::uint64_t before = 0);
 
 /// The hash of a file's bytes. @throw std::runtime_error naming the file if it cannot be read.

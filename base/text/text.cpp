@@ -27,13 +27,12 @@ std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
     const auto code = static_cast<unsigned char>(c);
-    if (c == '\n') {
+    if (c == '\n')
       result += "\\n";
-    } else if (code < 0x20 || code == 0x7f) {
+    else if (code < 0x20 || code == 0x7f)
       result += fmt::format("\\x{:02x}", code);
-    } else {
+    else
       result += c;
-    }
   }
   return result;
 }

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <stdexcept>
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
@@ -40,8 +38,7 @@ Affine2d straight_map(const Plate& receiver, const Plate& image, const Eigen::Ve
   return map;
 }
 
-/// The part of the image whose light may reach the receiver: the part in front of the volume, and the part that
-/// straight light shows.
+/// The part of the image whose light may reach the receiver: what is before the volume, and what straight light shows.
 Eigen::AlignedBox2d useful_starts(const LensLight& light, const TriangleMesh& volume) {
   const Plate& plane = light.setup.image.plane;
   Eigen::AlignedBox2d useful;
@@ -175,8 +172,7 @@ PlanarMesh reference_mesh(const LensLight& light) {
   return mesh;
 }
 
-/// Counts the places of the picture that show what each pixel sees, in `gather`: the map from the picture to the image
-/// may fold, and each sheet is one place.
+/// Counts the places of the picture that show what each pixel sees, in `gather`: one on each sheet of the map.
 void count_places(const LensView& view, LensPicture& picture) {
   const LensSetup& setup = view.light.setup;
   const PlanarMesh mesh = reference_mesh(view.light);

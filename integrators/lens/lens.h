@@ -50,13 +50,11 @@ struct TraceCounts {
 
 /// A map from the plane of `from` to the plane of `to`; a function of the start and the flexibility. The planes stand
 /// for an image and a receiver. Both are opaque: light is not followed beyond them, and a plane within the volume cuts
-/// it. Both planes extend beyond their plates, to 100 times the volume's size. Immutable; any number of threads may
-/// trace at once.
+/// it. Both planes extend to 100 times the volume's size. Immutable: threads may share it.
 class LensMap {
  public:
   /// @param surfaces   Bounds, cut and obstacles; its plate is not used.
-  /// @param direction  Direction of the light, unit, from one plane to the other.
-  /// `field` must outlive the map.
+  /// @param direction  Direction of the light, unit, from one plane to the other. `field` must outlive the map.
   /// @throw std::runtime_error if Embree fails.
   LensMap(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending, const Plate& from,
           const Plate& to, const Eigen::Vector3d& direction);
@@ -98,8 +96,7 @@ struct LensImage {
                        ///< `gather`). If not, the texture should clamp, so that its edges are as sharp as the samples.
 };
 
-/// A part of the light: a narrow band of wavelengths, or a colour in RGB mode. It is spread evenly over the points of
-/// the image that its light sees.
+/// A narrow band of wavelengths, or a colour in RGB mode: spread evenly over the points of the image that it sees.
 struct LensBand {
   double begin = 0, end = 0;  ///< Its ends, as places between the first (0) and the last (1) flexibility. They are
                               ///< equal outside a range.
@@ -108,8 +105,7 @@ struct LensBand {
   Eigen::Vector3d color = Eigen::Vector3d::Zero();  ///< What a radiance of 1 adds to the picture (R, G, B).
 };
 
-/// Writes the radiances of a colour (R, G, B in the working space) in the bands from `first` to `last`, without it;
-/// white has 1.
+/// Writes the radiances of a colour of the working space in the bands from `first` to `last`, without it; white has 1.
 using LensRadiance =
     std::function<void(const Eigen::Vector3d& rgb, std::size_t first, std::size_t last, double* radiances)>;
 
@@ -136,8 +132,7 @@ struct LensSettings {
   std::function<void(const std::function<const LensLight&()>& so_far)> show;
 };
 
-/// Why a pixel sees the image, or does not. The values are the ends of rays: `image` is a ray that landed on the image,
-/// and `outside` one that landed beside it.
+/// Why a pixel sees the image, or does not: the ends of rays, where `image` landed on it, and `outside` beside it.
 enum class LensEnd { image, missed, obstacle, step_limit, degenerate, outside };
 static_assert(static_cast<int>(LensEnd::degenerate) == static_cast<int>(RayEnd::degenerate));
 constexpr int lens_end_count = 6;
@@ -202,14 +197,12 @@ LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const B
 /// The picture that `bands` make up.
 /// @param channels    Number of channels; the bands of a channel follow each other.
 /// @param by_channel  Whether the result has the radiance of each channel.
-/// @throw Cancelled; as Ranks::gather. The result is the same for any number of threads and ranks; only the root has
-/// it.
+/// @throw Cancelled; as Ranks::gather. The result is the same for any number of threads and ranks; the root has it.
 LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance,
                       std::size_t channels, bool by_channel, const Progress& progress);
 
 /// Adds the obstacles between the receiver and the plane of the image to a picture with the receiver's resolution,
-/// where its alpha is less than 1: as the viewer sees them straight along its lines of sight, by light that comes from
-/// there.
+/// where its alpha is less than 1: as the viewer sees them along straight lines, in light from there.
 /// @param surfaces  Their obstacles are drawn. @param samples  Of a pixel along x and along y.
 /// @param image  Its first channels are R, G and B, multiplied by alpha, and A.
 /// @throw std::runtime_error if Embree fails.

@@ -1,7 +1,6 @@
 #pragma once
 /// @file integrators/lens/lens_method.h
-/// The method "lens": an image seen through the field. The keys of `integrator` that it has; lengths are in world
-/// units.
+/// The method "lens": an image seen through the field. Its keys of `integrator`; lengths are in world units.
 
 #include <filesystem>
 #include <memory>
@@ -50,25 +49,13 @@ struct LensDescription {
   ObstacleLook obstacles = ObstacleLook::hidden;
 };
 
-inline Choices<LensMode> choices(LensMode) { return {{"gather", LensMode::gather}, {"scatter", LensMode::scatter}}; }
-
-inline Choices<Wrap> choices(Wrap) {
-  return {{"none", Wrap::none}, {"clamp", Wrap::clamp}, {"repeat", Wrap::repeat}, {"mirror", Wrap::mirror}};
-}
-
-inline Choices<Overlay> choices(Overlay) { return {{"none", Overlay::none}, {"grid", Overlay::grid}}; }
-
-inline Choices<ObstacleLook> choices(ObstacleLook) {
-  return {{"hidden", ObstacleLook::hidden}, {"shaded", ObstacleLook::shaded}};
-}
+inline Words words(LensMode) { return {"gather", "scatter"}; }
+inline Words words(Wrap) { return {"none", "clamp", "repeat", "mirror"}; }
+inline Words words(Overlay) { return {"none", "grid"}; }
+inline Words words(ObstacleLook) { return {"hidden", "shaded"}; }
 
 /// Names of the built-in images for `integrator.image`.
-inline Choices<TestImage> choices(TestImage) {
-  return {{"checkerboard", TestImage::checkerboard},
-          {"grid", TestImage::grid},
-          {"color_wheel", TestImage::color_wheel},
-          {"line", TestImage::line}};
-}
+inline Words words(TestImage) { return {"checkerboard", "grid", "color_wheel", "line"}; }
 
 inline void describe(ImagePlaneDescription& plane, KeyVisitor& visit) {
   visit.exclude("distance", {"depth", "center"});

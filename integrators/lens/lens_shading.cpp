@@ -89,8 +89,7 @@ class SampleView {
     }
   }
 
-  /// The length, in pixels, of the line of the image that the light of all bands comes from; infinite if it is not one
-  /// line.
+  /// Pixels along the line of the image that the light of all bands comes from; infinite if it is not one line.
   double sweep(const std::vector<Span>& spans) const {
     double length = 0;
     for (const Span& span : spans) {
@@ -129,17 +128,15 @@ class SampleView {
     std::vector<Span> spans;
     for (std::size_t band = 0; band < view_.spans.size(); ++band) {
       const std::vector<Span>& parts = view_.parts[band];
-      if (!parts.empty() && is_torn(view_.spans[band])) {
+      if (!parts.empty() && is_torn(view_.spans[band]))
         spans.insert(spans.end(), parts.begin(), parts.end());
-      } else {
+      else
         spans.push_back(view_.spans[band]);
-      }
     }
     return spans;
   }
 
-  /// Whether the points seen at `wavelengths` are at most `distance` (pixels) from the parabola through every second of
-  /// them.
+  /// Whether the points seen at `wavelengths` are within `distance` (pixels) of the parabola through every second one.
   bool is_smooth(const std::vector<std::size_t>& wavelengths, double distance) const {
     std::vector<double> places;
     for (std::size_t i = 0; i < wavelengths.size(); i += 2) places.push_back(view_.wavelengths[wavelengths[i]].place);

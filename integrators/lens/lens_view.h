@@ -46,15 +46,13 @@ struct LensView {
 /// `light`, `bands` and `radiance` must outlive the result.
 LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance);
 
-/// About `count` spans, which together are all of `spans`. In a range spans end where others begin; other lights have
-/// nothing in common and stay apart.
+/// About `count` spans, which together are all of `spans`. Outside a range they have nothing in common and stay apart.
 std::vector<Span> joined(const std::vector<Span>& spans, std::size_t count);
 
 /// What the samples of a tile see, by wavelength and sample; empty for wavelengths that are not drawn.
 using TileView = std::vector<std::vector<FlowPoint>>;
 
-/// What the samples of a tile see at the wavelengths of `spans`. In `gather`, light that the map does not know is
-/// traced.
+/// What the samples of a tile see at the wavelengths of `spans`. In `gather`, light that is unknown is traced.
 /// @param n       Samples of a pixel along x and along y.
 /// @param wanted  By pixel of the tile: whether its samples are wanted. Empty: all are.
 TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span>& spans,
@@ -91,8 +89,7 @@ class TileShader {
  public:
   TileShader(const LensView& view, int tile, TraceCounts& counts);
 
-  /// Adds the light of a pixel to `light`. Where it is spread over several pixels of the image, one sample shows as
-  /// much as many.
+  /// Adds the light of a pixel to `light`. Spread over several pixels of the image, one sample is enough.
   /// @param x,y  In the tile.
   void shade(int x, int y, PixelLight& light);
 

@@ -10,7 +10,6 @@
 #include "scenes/description/check_scene.h"
 #include "scenes/description/scene_keys.h"
 #include "scenes/keys/section_reader.h"
-#include "scenes/source/frames.h"
 #include "scenes/source/overrides.h"
 
 namespace tensorray {

@@ -21,12 +21,10 @@ struct SceneChanges {
   /// removes a key. An index one past the end of a list appends an item.
   std::vector<std::string> overrides;
 
-  /// Files to write instead of those of the scene, relative to the working folder. The ending of each file selects one
-  /// of the method's outputs.
+  /// Files to write instead of the scene's, relative to the working folder; their endings select the method's outputs.
   std::vector<std::filesystem::path> outputs;
 
-  /// The frame of a scene that changes (see set_frame); # in `outputs` is its number, too. None: the scene must not
-  /// have keyframes.
+  /// The frame of a scene that changes (set_frame); # in `outputs` is its number, too. None: no keyframes are allowed.
   std::optional<int> frame = std::nullopt;
 };
 
@@ -34,8 +32,7 @@ struct SceneChanges {
 bool is_field_file(const std::filesystem::path& path);
 
 /// Reads a scene file: JSON with comments; of a field's file, which is not opened, it makes a scene of defaults.
-/// Relative paths in it are relative to the scene file's folder. If no output file is named, `image` and `exr` are
-/// files beside the scene file, with its name and .png and .exr.
+/// Relative paths in it are relative to the scene file's folder. Without outputs, `image` and `exr` have its name.
 /// @throw SceneError: the file is unreadable or not JSON; a key is unknown (with the nearest valid one), missing, of
 /// the wrong type or out of range; two keys exclude each other.
 SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes = {});

@@ -22,8 +22,7 @@
 
 namespace tensorray {
 
-/// Writes the file in place, in the order of `paths`. Paths without points are left out, because other programs do not
-/// accept them in either format.
+/// Writes the file in place, in the order of `paths`. Paths without points, which other programs refuse, are left out.
 /// @throw std::invalid_argument on another ending; std::runtime_error naming the file and the reason (also when the
 /// disk is full).
 void write_paths(const std::filesystem::path& path, const std::vector<Path>& paths);
@@ -33,15 +32,13 @@ bool stores_tensors(const std::filesystem::path& path);
 
 /// Reads the files of write_paths and of other programs. A `.vtp` that lacks one of `direction`, `length`, `tensor`,
 /// `change`, `in_field` (streamlines, for example) gives bare paths, as every `.tck` does: see bare_way. Polylines of
-/// fewer than two different points are left out. A `.vtp` may have any of VTK's encodings. Missing data of a path have
-/// the defaults of `Path`.
+/// fewer than two different points are left out. A `.vtp` may have any encoding. Missing data are those of `Path`.
 /// @throw std::invalid_argument on another ending; std::runtime_error naming the file and the reason: missing, damaged,
 /// cut off, no path in it, a value that is not finite.
 std::vector<Path> read_paths(const std::filesystem::path& path);
 
 /// A path of which only the positions are known. Of points that coincide, one is kept. Directions, lengths and V' are
-/// computed from the polyline (second order where points are dense); T = 0; all points count as in the field. Empty if
-/// fewer than two points are left.
+/// computed from the polyline (second order where points are dense); T = 0; all are in the field. Empty without two.
 PathPoints bare_way(const std::vector<Eigen::Vector3d>& positions);
 
 // One format each:

@@ -114,8 +114,7 @@ EnvironmentLight load_environment(const LightSourceDescription& description, con
   return environment;
 }
 
-/// Counts paths by channel and end. Paths of a file may have a flexibility that no channel of the scene has: they count
-/// for the first channel.
+/// Counts paths by channel and end. Paths of a file with a flexibility that no channel has count for the first one.
 void count_ends(const Scene& scene, const std::vector<Path>& paths, Statistics& statistics) {
   statistics.positions = paths.size();
   statistics.emitted.assign(scene.channels.size(), 0);

@@ -44,8 +44,7 @@ struct PictureFile {
   std::string layer;
 };
 
-/// Reads a picture and converts it to linear Rec. 709. @param notes  Gets warnings. @throw std::runtime_error naming
-/// the file.
+/// Reads a picture and converts it to linear Rec. 709. @param notes  Gets warnings. @throw std::runtime_error.
 Image load_rec709(const PictureFile& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709,
                   std::vector<std::string>& notes);
 
@@ -56,8 +55,7 @@ struct PathScene {
   ShownLights lights;
 };
 
-/// @throw std::runtime_error naming the file that cannot be read; SceneError if a value of the scene does not fit the
-/// loaded data.
+/// @throw std::runtime_error naming a file that cannot be read; SceneError if a value does not fit the loaded data.
 PathScene load_paths(const Scene& scene, const PathTracingDescription& settings, std::vector<std::string>& notes);
 
 /// Follows the rays, counts them by channel and end, and leaves out those that do not meet the volume.

@@ -1,11 +1,9 @@
 #include "integrators/path_tracing/path_colors.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <tbb/parallel_for.h>
 
-#include "integrators/path_tracing/path_tracing_method.h"
 #include "renderer/charts/color_bar.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "volumes/tensors/invariants.h"
@@ -69,8 +67,7 @@ ValueRange range_of(const PathColorDescription& description, const std::vector<P
   return choose_range(std::move(values), choice);
 }
 
-/// How far a path is from the points of another one, in their order: the segment that is the nearest moves on along the
-/// path.
+/// How far a path is from the points of another one, in their order: the nearest segment moves on along the path.
 class DistanceTo {
  public:
   explicit DistanceTo(const PathPoints& way) : way_(way) {}
@@ -114,8 +111,7 @@ bool add_mixture(const PathPoints& way, const Path& other, double radius, std::v
   return is_near;
 }
 
-/// Whether a path has the seed of the one before it: paths of a seed rise in wavelength, or, with red, green and blue,
-/// fall.
+/// Whether a path has the seed of the one before it: paths of a seed rise in wavelength, or, in RGB mode, fall.
 bool has_seed_before(const std::vector<Path>& paths, std::size_t path) {
   const auto rises = [&](std::size_t i) { return paths[i].wavelength > paths[i - 1].wavelength; };
   return paths[path].wavelength != paths[path - 1].wavelength && rises(path) == rises(1);

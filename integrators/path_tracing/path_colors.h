@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "integrators/path_tracing/path_tracing_method.h"
@@ -20,8 +19,7 @@ namespace tensorray {
 struct PathColors {
   /// The colour of each point of each path, linear Rec. 709, 0 to 1. Empty: paths have the colour of their material.
   std::vector<std::vector<Eigen::Vector3d>> of_points;
-  /// Draws a legend of the colours over a picture. `from_rec709` converts colours of linear Rec. 709 to those of the
-  /// picture. Empty: no legend.
+  /// Draws a legend of the colours over a picture. `from_rec709`: to the picture's colours. May be empty.
   std::function<void(Image&, const Eigen::Matrix3d& from_rec709)> legend;
 };
 

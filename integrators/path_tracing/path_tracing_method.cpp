@@ -75,8 +75,7 @@ PathShapes make_shapes(const Scene& scene, const PathScene& path_scene, const st
   return shapes;
 }
 
-/// Refuses a scene that is so large that the renderer would lose the paths, because its precision is relative to the
-/// size of the whole scene.
+/// Refuses a scene so large that the renderer, whose precision is relative to its size, would lose the paths.
 void require_fine(const Scene& scene, const RadiusDescription& radius, const SurfaceScene& stage,
                   const std::vector<Path>& paths) {
   const double typical = typical_radius(radius, paths.size(), scene.field.world_box());

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -105,33 +104,15 @@ struct PathTracingDescription {
   Eigen::Vector3d background_color{1, 1, 1};  ///< Linear Rec. 709.
 };
 
-inline Choices<SeedKind> choices(SeedKind) {
-  return {{"grid", SeedKind::grid},     {"poisson_disk", SeedKind::poisson_disk}, {"line", SeedKind::line},
-          {"sphere", SeedKind::sphere}, {"threshold", SeedKind::threshold},       {"file", SeedKind::file}};
+inline Words words(SeedKind) { return {"grid", "poisson_disk", "line", "sphere", "threshold", "file"}; }
+inline Words words(PathStyle) { return {"tube", "wire", "ellipses", "lines"}; }
+inline Words words(TubeCaps) { return {"open", "flat", "round"}; }
+
+inline Words words(PathColor) {
+  return {"force", "transverse_force", "curvature", "length", "wavelength", "direction", "invariant", "none"};
 }
 
-inline Choices<PathStyle> choices(PathStyle) {
-  return {{"tube", PathStyle::tube},
-          {"wire", PathStyle::wire},
-          {"ellipses", PathStyle::ellipses},
-          {"lines", PathStyle::lines}};
-}
-
-inline Choices<TubeCaps> choices(TubeCaps) {
-  return {{"open", TubeCaps::open}, {"flat", TubeCaps::flat}, {"round", TubeCaps::round}};
-}
-
-inline Choices<PathColor> choices(PathColor) {
-  return {{"force", PathColor::force},           {"transverse_force", PathColor::transverse_force},
-          {"curvature", PathColor::curvature},   {"length", PathColor::length},
-          {"wavelength", PathColor::wavelength}, {"direction", PathColor::direction},
-          {"invariant", PathColor::invariant},   {"none", PathColor::none}};
-}
-
-inline Choices<Shading> choices(Shading) {
-  return {
-      {"path", Shading::path}, {"ambient_occlusion", Shading::ambient_occlusion}, {"headlight", Shading::headlight}};
-}
+inline Words words(Shading) { return {"path", "ambient_occlusion", "headlight"}; }
 
 inline Choices<PixelFilterShape> choices(PixelFilterShape) {
   return {{"blackman_harris", PixelFilterShape::blackman_harris},
@@ -139,9 +120,7 @@ inline Choices<PixelFilterShape> choices(PixelFilterShape) {
           {"box", PixelFilterShape::box}};
 }
 
-inline Choices<Background> choices(Background) {
-  return {{"color", Background::color}, {"lights", Background::lights}, {"transparent", Background::transparent}};
-}
+inline Words words(Background) { return {"color", "lights", "transparent"}; }
 
 inline void describe(SeedDescription& seeds, KeyVisitor& visit) {
   visit("kind", seeds.kind, "how seeds are spread: on the entry plane (grid, poisson_disk), or in the volume", knob());

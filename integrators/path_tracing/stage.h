@@ -1,12 +1,10 @@
 #pragma once
 /// @file integrators/path_tracing/stage.h
-/// What all pictures of surfaces share: camera and lights (studio.cpp), the settings of the path tracer, visible lamps,
-/// and the channels of the picture.
+/// What all pictures of surfaces share: camera, lights, visible lamps, settings of the path tracer, and channels.
 
 #include <filesystem>
 #include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -43,8 +41,7 @@ void set_groups(const SceneDescription& scene, ShadedScene& shaded);
 void set_picture(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
                  const SceneDescription& scene, Render& render);
 
-/// @param so_far  What there is without a picture; must outlive the result. @param add_picture  Adds one, which is
-/// shown.
+/// @param so_far  What there is without a picture; must outlive the result. @param add_picture  Adds one to show.
 RenderCallbacks render_callbacks(const Progress& progress, RenderJob* job, const Render& so_far,
                                  const std::function<void(const SurfacePicture&, Render&)>& add_picture);
 

@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "base/process/archive.h"
@@ -39,8 +38,7 @@ class FluenceSums {
   /// Adds a ray of the channel. Any number of threads may add rays at once.
   void add(std::size_t channel, const RayRecord& ray);
 
-  /// Writes the sums so far, or adds those of other rays; not while rays are added. @throw DamagedArchive if they are
-  /// those of other bands or another field.
+  /// Writes the sums so far, or adds others; not while rays are added. @throw DamagedArchive if bands or field differ.
   void copy_sums(Archive& archive);
 
   /// The grids, as fog volumes: the one of all channels, then, with `bands`, one for each channel (1 is the undisturbed

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <memory>
 #include <thread>
 #include <utility>
 
@@ -17,8 +16,7 @@
 namespace tensorray {
 namespace {
 
-// Largest number of positions of a chunk. Many positions give work to all threads; the number of rays is also limited,
-// so that a chunk does not take long.
+// Largest number of positions of a chunk, and of its rays: it has work for all threads, and does not take long.
 constexpr std::uint64_t largest_chunk = 1u << 16, rays_in_chunk = 1u << 20;
 constexpr std::uint64_t task_size = 32;       // Number of positions that one thread traces as one task.
 constexpr std::uint64_t rays_in_batch = 512;  // Approximate; all wavelengths of a position stay together.
@@ -61,8 +59,7 @@ void emit(const BeamSampler& positions, std::uint64_t first, std::uint64_t last,
   for (const std::uint64_t key : order) emissions.push_back(sampled[static_cast<std::uint32_t>(key)]);
 }
 
-/// A ray that leaves the cut and meets nothing more still crosses the rest of the volume: adds this piece to its
-/// record.
+/// A ray that leaves the cut and meets nothing more still crosses the rest of the volume: adds it to its record.
 void record_way_out(const PhotonJob& job, const RayBatch& batch, std::size_t ray, RayRecord& record) {
   const Eigen::Vector3d &position = batch.position[ray], &direction = batch.direction[ray];
   const bool is_open = batch.end[ray] == RayEnd::missed && !std::isfinite(job.settings.bending.max_length);

@@ -37,8 +37,7 @@ std::vector<PlatePhoton> joined_chunks(std::map<std::uint64_t, std::vector<Plate
   return all;
 }
 
-/// The part of the light that has been traced where it has been traced at all. Positions in rows fill the beam row by
-/// row; others fill all of it at once.
+/// The part of the light that is traced where any is: positions in rows fill the beam row by row, others all at once.
 double share_of(const PhotonJob& job, const PhotonSums& sums) {
   const BeamPattern pattern = job.settings.pattern;
   if (pattern == BeamPattern::grid || pattern == BeamPattern::stratified || sums.candidates == 0) return 1;

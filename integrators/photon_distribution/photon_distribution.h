@@ -40,8 +40,7 @@ struct PhotonSettings {
   std::vector<Eigen::Vector3d> colors;
 
   /// Keeps what was traced, every now and then, as "photons" and the number of a part: as many parts as the job has.
-  /// What is kept depends on the kinds of outputs: those that are wanted must have been from the beginning. Null:
-  /// alone, and nothing is kept.
+  /// What is kept depends on the kinds of outputs: those wanted must have been from the beginning. May be null.
   Job* job = nullptr;
 
   /// Gets what there is so far when the job wants a picture; may be empty. Called by the calling thread, at the root.
@@ -57,8 +56,7 @@ struct PhotonDistribution {
                                     ///< names. See fluence.h.
 
   std::uint64_t positions = 0;  ///< Number of positions that emitted.
-  /// One entry for each channel: rays, counted where they start, and where they end. Every ray of a channel has the
-  /// same power.
+  /// By channel: rays, counted where they start, and where they end. Every ray of a channel has the same power.
   std::vector<std::uint64_t> emitted;
   std::vector<EndCounts> ends;
   double ray_area = 0;  ///< Cross section of the beam that one ray stands for, world units².
@@ -67,9 +65,8 @@ struct PhotonDistribution {
   double seconds_density = 0;  ///< From the sums to the film.
 };
 
-/// Emits parallel light, bends it through the field and estimates its density on the plate of `geometry`.
-/// The result is the same for any number of threads, ranks and parts. Of ranks, only the root has it. Of a shard, it is
-/// empty: what its part has is kept.
+/// Emits parallel light, bends it through the field and estimates its density on the plate of `geometry`. The result is
+/// the same for any number of threads, ranks and parts. Of ranks, only the root has it. That of a shard is empty.
 /// @throw std::invalid_argument if a setting is out of range or `geometry` has no plate; DamagedArchive if what was
 /// kept is of other light or outputs; Cancelled; as Ranks::gather.
 PhotonDistribution distribute_photons(const TensorField& field, const Geometry& geometry, const Beam& beam,

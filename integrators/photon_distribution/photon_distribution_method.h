@@ -31,12 +31,7 @@ struct PhotonDescription {
   bool side_light = true;  ///< Whether light that leaves the volume by its side faces falls on the plate.
 };
 
-inline Choices<PhotonDensityKind> choices(PhotonDensityKind) {
-  return {{"mesh", PhotonDensityKind::mesh},
-          {"gaussian", PhotonDensityKind::gaussian},
-          {"histogram", PhotonDensityKind::histogram},
-          {"photon_differential", PhotonDensityKind::photon_differential}};
-}
+inline Words words(PhotonDensityKind) { return {"mesh", "gaussian", "histogram", "photon_differential"}; }
 
 /// The estimator for photons. `mesh` needs no photons; photons for other outputs are then only counted.
 inline DensitySettings estimator_of(const PhotonDensity& density) {

@@ -1,14 +1,22 @@
 #include "integrators/photon_distribution/plate_light.h"
 
+#include <algorithm>
 #include <utility>
 
-#include "base/process/seconds.h"
+#include <Eigen/Geometry>
+
 #include "integrators/photon_distribution/photon_distribution.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
 #include "renderer/film/spectral_image.h"
+#include "scenes/outputs/channel_table.h"
+#include "tracing/flow_drawing/flow_view.h"
 
 namespace tensorray {
 namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
 
 /// Whether photons are collected as red, green and blue. Up to three bands need no more planes, and cost less.
 bool is_collected_in_color(const Scene& scene) {
@@ -61,6 +69,49 @@ PlateLight trace_photons(const Scene& scene, const PhotonSettings& settings, con
   return has_light ? light_of(scene, std::move(traced)) : PlateLight();
 }
 
+/// From pixels of a plate to the start, in the beam's frame, of straight light that lands there.
+Eigen::Affine2d straight_starts(const Plate& plate, const Beam& beam) {
+  const auto start = [&](const Vector2d& pixel) -> Vector2d {
+    const Vector3d from_center = plate.to_world(pixel) - beam.center;
+    return {from_center.dot(beam.right), from_center.dot(beam.up)};
+  };
+  Eigen::Affine2d map;
+  map.translation() = start({0, 0});
+  map.linear() << start({1, 0}) - map.translation(), start({0, 1}) - map.translation();
+  return map;
+}
+
+/// How light lands at the centre of a pixel.
+struct PlateLanding {
+  const FlowPoint& point;
+  Vector3d moved;  ///< From where straight light would land.
+  PrincipalStretch stretch;
+};
+
+PlateLanding landing_of(const FlowPoint& point, const Vector2d& pixel, const Plate& plate,
+                        const Eigen::Affine2d& straight) {
+  // World units on the plate, along right and up, by those across the beam.
+  const Vector2d pixel_size = plate.pixel_size();
+  const Matrix2d jacobian = Vector2d(pixel_size.x(), -pixel_size.y()).asDiagonal() * point.jacobian.cast<double>();
+  return {point, plate.to_world(pixel) - plate.to_world(straight.inverse() * point.other.cast<double>()),
+          principal_stretch(jacobian)};
+}
+
+double limited(double logarithm) { return std::clamp(logarithm, -100.0, 100.0); }
+
+ChannelTable<PlateLanding> plate_channels() {
+  using Landing = const PlateLanding&;
+  return {{{"displacement.x", "displacement.y", "displacement.z"}, [](Landing landing) { return landing.moved; }},
+          {{"magnification.log"}, [](Landing landing) { return limited(landing.stretch.logs.sum()); }},
+          {{"magnification.major", "magnification.minor", "magnification.angle"},
+           [](Landing landing) -> Vector3d {
+             return {limited(landing.stretch.logs[0]), limited(landing.stretch.logs[1]), landing.stretch.angle};
+           }},
+          {{"folds"}, [](Landing landing) { return landing.point.sheets; }},
+          {{"length"}, [](Landing landing) { return landing.point.length; }},
+          {{"error"}, [](Landing landing) { return std::min(landing.point.error, 100.0f); }}};
+}
+
 }  // namespace
 
 void add_cost(const Statistics& more, Statistics& statistics) {
@@ -85,6 +136,39 @@ PlateLight light_on_plate(const Scene& scene, const Progress& progress, Job* job
   light.render.grids = std::move(photons.grids);
   add_cost(photons.statistics, light.render.statistics);
   return light;
+}
+
+std::size_t plate_map_channels() { return channel_names(plate_channels()).size(); }
+
+Image plate_map(const FlowMap& map, const Scene& scene, const Progress& progress, Job* job) {
+  const Plate& plate = *scene.geometry.surfaces().plate;
+  FlowPicture picture;
+  picture.resolution = plate.resolution;
+  picture.straight = straight_starts(plate, scene.beam);
+  const double place = reference_place(scene) * static_cast<double>(map.wavelengths - 1);
+  const FlowView view(map, picture, {FlowRange{place, place}}, 1);
+  const ChannelTable<PlateLanding> table = plate_channels();
+  Image image(plate.resolution.x(), plate.resolution.y(), channel_names(table));
+  Units tiles;
+  tiles.count = static_cast<std::size_t>(view.tiles());
+  tiles.round = FlowView::tiles_at_once;
+  tiles.make = [&](std::size_t tile) {
+    std::vector<FlowPoint> points;
+    view.draw(static_cast<int>(tile), 1, 0, place, {}, points);
+    const Eigen::AlignedBox2i box = view.pixels(static_cast<int>(tile));
+    auto point = points.begin();
+    for (int y = box.min().y(); y <= box.max().y(); ++y)
+      for (int x = box.min().x(); x <= box.max().x(); ++x, ++point)
+        if (point->end == RayEnd::plate)
+          write_channels(table, landing_of(*point, {x + 0.5, y + 0.5}, plate, picture.straight), image.pixel(x, y));
+  };
+  tiles.copy = [&](std::size_t tile, Archive& archive) {
+    const Eigen::AlignedBox2i box = view.pixels(static_cast<int>(tile));
+    const std::size_t row = (static_cast<std::size_t>(box.sizes().x()) + 1) * image.channels.size() * sizeof(float);
+    for (int y = box.min().y(); y <= box.max().y(); ++y) archive.copy(image.pixel(box.min().x(), y), row);
+  };
+  make_units(tiles, job, "drawing the map", progress);
+  return image;
 }
 
 }  // namespace tensorray

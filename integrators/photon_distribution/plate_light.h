@@ -36,8 +36,7 @@ PlateLight light_on_plate(const Scene& scene, const Progress& progress, Job* job
 
 /// The light of a scene with the density `mesh`: drawn from the flow map of the beam, with the ranks of the job. Its
 /// shards and checkpoints have the landings of its flow maps' vertices (FlowSettings::is_kept): of a shard, the result
-/// is empty. With a bound of the error, a shard refines until the error of its own part is below it; what more the
-/// whole picture needs is traced where the shards are merged.
+/// is empty. With a bound of the error, a shard refines until that of its own part is below it.
 /// @param job   Null: alone, and nothing is kept. @param show  Gets the light so far when the job wants a picture.
 /// @throw Cancelled; as Ranks::all_gather.
 PlateLight mesh_light(const Scene& scene, const Progress& progress, Job* job, const ShowLight& show);

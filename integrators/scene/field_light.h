@@ -3,16 +3,14 @@
 /// The lights of the method "scene", and the light that they throw through the field on its objects. Each pair of a
 /// light and an object has either photons (photons.cpp) or a flow map (sunlight.cpp).
 
-#include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <vector>
 
 #include "base/process/progress.h"
 #include "integrators/path_tracing/load_paths.h"
 #include "integrators/scene/scene_method.h"
-#include "renderer/light_maps/irradiance_map.h"
+#include "renderer/light_maps/photon_map.h"
 #include "renderer/light_maps/photon_tracer.h"
 #include "renderer/lights/lights.h"
 #include "renderer/materials/material.h"

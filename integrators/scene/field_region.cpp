@@ -45,8 +45,7 @@ struct WayEnd {
   double log_jacobian = 0;
 };
 
-/// @param nodes  Indices of ways. The abscissa is the number of the band: a ray has the same place in each of its
-/// bands.
+/// @param nodes  Indices of ways. The abscissa is the number of the band, as a ray has one place in all its bands.
 WayEnd interpolated(const std::vector<std::size_t>& nodes, const std::vector<BentRay>& ways, int band) {
   WayEnd sum;
   for (const std::size_t node : nodes) {
@@ -87,8 +86,7 @@ double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) con
   return leaves - enters > rounding_ ? enters : infinite;
 }
 
-/// Where a way is followed from. With obstacles this is a little behind the entry into the volume, so that the way does
-/// not meet the surface on which it starts.
+/// Where a way is followed from. With obstacles, a little behind the entry, so as not to meet the surface it starts on.
 Vector3d FieldRegion::start_of(const BentRay& way) const {
   if (geometry_.surfaces().obstacles.empty()) return way.position;
   const double before = entry(way.position, way.direction);
@@ -145,8 +143,7 @@ void FieldRegion::follow_some(const std::vector<std::size_t>& which, std::vector
   for (std::size_t k = 0; k < which.size(); ++k) ways[which[k]] = some[k];
 }
 
-/// Follows some ways of each group and all that are in none; then the rest of groups that cannot be interpolated. Each
-/// is one call of `trace`.
+/// Follows some ways of each group and all that are in none; then, in one call, groups that cannot be interpolated.
 void FieldRegion::follow_groups(std::vector<BandGroup> groups, std::vector<BentRay>& ways) const {
   std::vector<std::size_t> wanted;
   std::vector<Vector3d> starts;
@@ -194,8 +191,7 @@ int FieldRegion::face_at(const Vector3d& position) const {
   return -1;
 }
 
-/// If radiance is constant, a photon's power changes by e^Λ: the inverse of the factor on radiance if power is
-/// constant.
+/// If radiance is constant, a photon's power changes by e^Λ: the inverse of the factor on radiance otherwise.
 void FieldRegion::trace_importance(std::vector<BentRay>& ways) const {
   follow(1, settings_.conserve == Conserve::radiance, ways);
   for (BentRay& way : ways) way.arrives = way.arrives && std::isfinite(way.radiance_scale);

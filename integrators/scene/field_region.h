@@ -1,8 +1,8 @@
 #pragma once
 /// @file integrators/scene/field_region.h
 /// A tensor field in the view of a camera. Light is followed backwards, by Eq. 5 with −s. If there are no obstacles,
-/// some ways that allow a tolerance are interpolated (BandGroup). The traced ways of their group must leave
-/// the volume through the same face of its box.
+/// some ways that allow a tolerance are interpolated (BandGroup). The traced ways of their group must leave the volume
+/// through the same face of its box.
 
 #include <array>
 #include <atomic>
@@ -20,8 +20,7 @@
 namespace tensorray {
 
 /// Ways [first, first + count) of a list, in the order of their bands: those of one ray. Almost everywhere, the way of
-/// light is a smooth function of its wavelength. A Lagrange polynomial through Chebyshev nodes is used if one more
-/// traced band agrees with it.
+/// light is a smooth function of its wavelength. A polynomial through Chebyshev nodes is used if one more band agrees.
 struct BandGroup {
   std::size_t first = 0, count = 0;
   std::vector<std::size_t> nodes;  ///< Indices of the ways that interpolation is made of; ascending.
@@ -30,8 +29,7 @@ struct BandGroup {
   bool is_traced(std::size_t way) const;  ///< Whether the way is a node or the check.
 };
 
-/// The groups in which ways may be interpolated: 6 or more neighbours that start alike and allow a `tolerance`. Fewer
-/// would gain too little.
+/// The groups in which ways may be interpolated: 6 or more neighbours that start alike and allow a `tolerance`.
 std::vector<BandGroup> interpolation_groups(const std::vector<BentRay>& ways);
 
 /// Whether the nodes predict the check: its direction within its tolerance, its position within the tolerance as seen

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 
 #include "integrators/path_tracing/path_colors.h"
 #include "integrators/path_tracing/stage.h"

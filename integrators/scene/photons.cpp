@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "base/constants.h"
 #include "base/overloaded.h"

@@ -10,7 +10,6 @@
 #include "integrators/path_tracing/path_tracing_method.h"
 #include "integrators/path_tracing/stage.h"
 #include "integrators/scene/field_light.h"
-#include "integrators/scene/field_region.h"
 #include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/picture_outputs.h"
@@ -61,8 +60,7 @@ std::vector<Vector3d> points_of_interest(const Scene& scene, const std::vector<S
   return points;
 }
 
-/// The volume for rays that are seen. Surfaces that reach into it stop light there; if there are any, all surfaces
-/// must.
+/// The volume for rays that are seen. If surfaces reach into it and stop light there, all must.
 Geometry seen_geometry(const Scene& scene, const SurfaceScene& stage) {
   Surfaces surfaces;
   surfaces.bounds = scene.geometry.surfaces().bounds;
@@ -123,9 +121,8 @@ void report(const FieldRegion& region, const ObjectScene& loaded, Render& result
   statistics.positions = region.ways();
   statistics.emitted = {region.ways()};
   statistics.ends.assign(1, EndCounts{});
-  for (int end = 0; end < ray_end_count; ++end) {
+  for (int end = 0; end < ray_end_count; ++end)
     statistics.ends[0][static_cast<std::size_t>(end)] = region.ways(static_cast<RayEnd>(end));
-  }
   if (region.limited() * 1000 > statistics.positions)
     result.warnings.push_back(
         fmt::format("the field increases radiance by more than `integrator.max_gain` ({:g}) on {:.2g}% of the ways "

@@ -1,8 +1,7 @@
 #pragma once
 /// @file integrators/scene/scene_method.h
-/// The method "scene": surfaces lit by light that the field bends, seen by a camera whose rays it bends, too. The keys
-/// of `integrator` that only this method has; it shares bands, samples, noise, max_depth, indirect_clamp, filter,
-/// shading and background with path tracing.
+/// The method "scene": surfaces lit by light that the field bends, seen by a camera whose rays it bends, too. Its own
+/// keys of `integrator`; it shares others with path tracing.
 
 #include <cstdint>
 #include <memory>
@@ -34,7 +33,7 @@ struct SceneMethodDescription {
   PhotonsDescription photons;
 };
 
-inline Choices<Conserve> choices(Conserve) { return {{"power", Conserve::power}, {"radiance", Conserve::radiance}}; }
+inline Words words(Conserve) { return {"power", "radiance"}; }
 
 inline void describe(CausticDescription& caustic, KeyVisitor& visit) {
   visit("resolution", caustic.resolution, "pixels along the longer side of the part of a plate where light lands",

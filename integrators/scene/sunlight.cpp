@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -129,8 +128,7 @@ void face(double side, IrradianceMap& light) {
   if (!(light.towards.dot(normal) > grazing_cosine)) light.towards = normal;
 }
 
-/// The light with this number on an object; nothing if none lands. @throw SceneError if the light is where it cannot
-/// be.
+/// The light with this number on an object; nothing if none lands. @throw SceneError if it is where it cannot be.
 std::optional<IrradianceMap> land(const LitObjects& lit, std::size_t number, const LandingLight& light,
                                   std::size_t receiver, const CausticDescription& caustic, const Progress& progress) {
   const Scene& scene = lit.scene;

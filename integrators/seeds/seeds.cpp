@@ -8,7 +8,6 @@
 #include <stdexcept>
 #include <string>
 
-#include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
@@ -29,8 +28,7 @@ void require_some(std::uint64_t count) {
   if (count == 0) throw std::invalid_argument("the count of seeds must be 1 or more");
 }
 
-/// Points in a grid whose cells are too small for two points. It finds whether a point lies within a distance of
-/// another one.
+/// Points in a grid whose cells are too small for two. It finds whether a point lies within a distance of another one.
 class NeighbourGrid {
  public:
   NeighbourGrid(const Eigen::Vector2d& corner, const Eigen::Vector2d& extent, double distance)

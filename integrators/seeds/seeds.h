@@ -21,8 +21,7 @@ namespace tensorray {
 std::vector<Eigen::Vector3d> grid_seeds(const Beam& beam, std::uint64_t count);
 
 /// Exactly `count` points, uniform on the beam's entry plane within its aperture. No two are nearer than 0.75 √(area /
-/// count) (70% of the distance in the densest lattice), so that they are evenly spread but show no lattice. The result
-/// depends only on the arguments.
+/// count) (70% of the distance in the densest lattice), which is even but no lattice.
 /// @throw std::invalid_argument if `count` is 0 or above 10⁷.
 std::vector<Eigen::Vector3d> poisson_disk_seeds(const Beam& beam, std::uint64_t count, std::uint64_t seed);
 

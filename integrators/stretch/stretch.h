@@ -21,8 +21,7 @@ class Job;
 
 /// The stretch at P₀ is ln σ / L, in 1/length, where σ is the greatest singular value of ∂P(L)/∂P₀. P(L) is the point
 /// of the ray from P₀ at length L, and P₀ moves across the light. The distance of two rays grows by a factor of at most
-/// exp(L · stretch). The stretch is 0 where light goes straight, and negative where all neighbours come nearer. Behind
-/// the volume rays go on straight.
+/// exp(L · stretch). The stretch is 0 where light goes straight, and negative where all neighbours come nearer.
 struct StretchSettings {
   Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Direction of the light at its start; unit.
   double flexibility = 0.2;                               ///< s.
@@ -42,16 +41,13 @@ struct StretchSettings {
 std::vector<float> stretches(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
                              const StretchSettings& settings, const std::vector<Eigen::Vector3d>& starts);
 
-/// The stretch at every point of a lattice in the volume, along the axes of the field's voxels. Voxels without a value
-/// are inactive.
+/// The stretch at every point of a lattice in the volume, along the voxels' axes. Voxels without a value are inactive.
 /// @param resolution  Voxels along the longest side of the extent in index space; the spacing is the same on all axes.
-/// The result is the same for any number of threads and ranks. @throw std::invalid_argument if a setting is out of
-/// range; Cancelled; as Ranks::gather.
+/// @throw std::invalid_argument if a setting is out of range; Cancelled; as Ranks::gather.
 ScalarGrid stretch_grid(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
                         const StretchSettings& settings, int resolution, const Progress& progress);
 
-/// The stretch at every pixel of a rectangle, row by row. The result is the same for any number of threads and
-/// ranks. @throw as stretch_grid.
+/// The stretch at every pixel of a rectangle, row by row. @throw as stretch_grid.
 std::vector<float> stretch_picture(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
                                    const StretchSettings& settings, const Plate& pixels, const Progress& progress);
 

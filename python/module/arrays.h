@@ -2,7 +2,6 @@
 /// @file python/module/arrays.h
 /// NumPy arrays of C++ memory, and the other way round. All functions need the GIL.
 
-#include <cstddef>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -41,8 +40,7 @@ py::array taken(std::vector<Value> values, const Shape& shape) {
   return py::array(py::dtype::of<Number>(), shape, data, owner);
 }
 
-/// The same for vectors of fixed-size Eigen matrices, whose numbers become further axes: `shape` has them, with the
-/// columns of a matrix before its rows.
+/// The same for fixed-size Eigen matrices, whose numbers become further axes: `shape` has their columns before rows.
 template <class Matrix>
 py::array taken_matrices(std::vector<Matrix> values, const Shape& shape) {
   using Number = typename Matrix::Scalar;

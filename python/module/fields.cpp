@@ -13,7 +13,6 @@
 #include "base/process/archive.h"
 #include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
-#include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "volumes/files/tensor_files.h"

@@ -2,18 +2,16 @@
 /// The module tensorray._tensorray. The package beside it (python/tensorray) has the functions for users; it makes
 /// their arguments plain, so that the functions here have no defaults.
 
-#include "python/module/module.h"
-
 #include <new>
 #include <stdexcept>
 #include <string>
 
-#include <pybind11/pybind11.h>
 #include <pybind11/stl/filesystem.h>
 
 #include "base/process/child_program.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"
+#include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "renderer/images/image.h"
 #include "scenes/keys/json_reader.h"

@@ -7,10 +7,8 @@
 
 #include "base/process/process_limits.h"
 #include "base/process/seconds.h"
-#include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
 #include "python/module/arrays.h"
-#include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "scenes/jobs/work_file.h"

@@ -1,14 +1,10 @@
 #include "python/module/scene_request.h"
 
-#include <stdexcept>
-#include <utility>
-
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
-#include "python/module/module.h"
 #include "scenes/source/overrides.h"
 
 namespace tensorray {

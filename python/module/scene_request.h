@@ -37,8 +37,7 @@ class Field {
   TensorGrid grid() const { return to_grid(blocks_); }
   const TriangleMesh& surface() const { return blocks_.surface; }
 
-  /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if a choice differs from the
-  /// last one.
+  /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if a choice differs.
   LoadedField loaded(const FieldChoices& choices) const;
 
  private:
@@ -80,5 +79,12 @@ Enum value_of(const std::string& argument, const std::string& word) {
     throw std::invalid_argument(argument + " must be " + Value<Enum>::expectation(value, {}));
   return value;
 }
+
+// The parts of the module tensorray._tensorray, one a source file:
+
+void add_fields(pybind11::module_& module);         ///< Field and its functions.
+void add_scene_request(pybind11::module_& module);  ///< SceneRequest.
+void add_renders(pybind11::module_& module);        ///< `render` with its result, and the functions for shards.
+void add_traces(pybind11::module_& module);         ///< `trace` and `landings`.
 
 }  // namespace tensorray

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
@@ -9,12 +8,10 @@
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
 #include "python/module/arrays.h"
-#include "python/module/module.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "renderer/meshes/mesh.h"

@@ -67,8 +67,8 @@ class Wedge {
     return {(left + right) / 2, (left - right) / (2 * slope)};
   }
 
-  /// The position across, at a given depth, of the eye that sees all points in the narrowest wedge. Bisection finds it,
-  /// as the depth of `eye` grows with the slope.
+  /// Where across, at a given depth, the eye sees all points in the narrowest wedge: by bisection, as slope grows with
+  /// depth.
   double middle(double depth, double widest) const {
     double low = 0, high = widest;
     for (int i = 0; i < 60; ++i) {

@@ -14,8 +14,7 @@ enum class Projection { perspective, orthographic };
 /// A camera in world space. Pixel coordinates are as in Plate: continuous, pixel (x, y) covers [x, x+1) × [y, y+1), and
 /// (0, 0) is the upper left corner of the picture. Pixels are square.
 ///
-/// A lens_radius > 0 makes it a thin-lens camera, perspective or telecentric (orthographic): objects in the plane at
-/// `focus_distance` are sharp.
+/// A lens_radius > 0 makes it a thin lens, perspective or telecentric: objects at `focus_distance` are sharp.
 struct Camera {
   Projection projection = Projection::perspective;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< Centre of the lens.
@@ -33,11 +32,9 @@ struct CameraRay {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitY();  ///< Unit.
 };
 
-/// A camera at `position` that looks at `target` and is focused there. `up` (world +z if it is zero or along the view)
-/// is upwards in the picture.
+/// A camera at `position`, focused on `target`. `up` (world +z if zero or along the view) is upwards in the picture.
 /// @param angle  Angle of view from the picture's lower edge to its upper edge, degrees; above 0 and below 180.
-/// @throw std::invalid_argument naming the parameter that is out of range or not finite, or if the two points are
-/// equal.
+/// @throw std::invalid_argument naming a parameter that is out of range or not finite, or if both points are equal.
 Camera perspective_camera(const Eigen::Vector3d& position, const Eigen::Vector3d& target, const Eigen::Vector3d& up,
                           double angle, const Eigen::Vector2i& resolution);
 
@@ -65,8 +62,7 @@ Camera frame_points(const std::vector<Eigen::Vector3d>& points, const Framing& f
 /// @param lens  Point in the unit disk: where the ray passes through the lens.
 CameraRay camera_ray(const Camera& camera, const Eigen::Vector2d& pixel, const Eigen::Vector2d& lens);
 
-/// The pixel coordinates of a point seen through the lens' centre, on the picture or beside it; nothing if the point is
-/// not in front of a perspective camera.
+/// The pixel coordinates of a point seen through the lens' centre; nothing if it is behind a perspective camera.
 std::optional<Eigen::Vector2d> to_pixel(const Camera& camera, const Eigen::Vector3d& point);
 
 /// The size, in world units, of a pixel in the plane through `point` normal to `forward`; 0 at the camera.

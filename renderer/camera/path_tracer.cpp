@@ -1,7 +1,6 @@
 #include "renderer/camera/path_tracer.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numeric>
 #include <optional>

@@ -79,8 +79,7 @@ struct PixelState {
   // Of those that hit a surface with this attribute.
   PixelMean<1> force, arc_length;
 
-  // If light bends. See BentView, of the samples that enter the region (divide the first two by `arrives`); 1, 0 and 1
-  // where none does.
+  // If light bends: BentView of samples that enter the region (divide two by `arrives`); 1, 0 and 1 where none does.
   PixelMean<1> radiance_scale{{1}}, deflection, arrives{{1}};
   PixelMean<2> texture;  ///< Place in the texture of a plate: 0, 0 is its lower left, 1, 1 its upper right corner.
   PixelMean<1> folds;    ///< Sheets of landed light, of a plate on which it has landed.

@@ -91,8 +91,7 @@ double PixelFilter::lower_sample(double u) const {
          t * rest * (rest * low.slope - t * high.slope);
 }
 
-/// Finds x between low and high with cumulative(x) = u, by Newton's method; a step that leaves the bracket is replaced
-/// by bisection.
+/// Finds x between low and high with cumulative(x) = u, by Newton's method, and bisection where a step leaves these.
 double PixelFilter::invert(double u, double low, double high) const {
   double x = (low + high) / 2;
   for (int i = 0; i < 60; ++i) {

@@ -15,15 +15,13 @@ enum class PixelFilterShape {
 };
 
 /// A positive, separable filter on [−radius, radius]² (of the box ½ pixel, of others 1.5), for filter importance
-/// sampling: the filter is the density of the samples' positions, and all samples of a pixel have weight 1. Immutable:
-/// any thread may use it.
+/// sampling: the filter is the density of the samples' positions, and all samples have weight 1. Immutable.
 class PixelFilter {
  public:
   explicit PixelFilter(PixelFilterShape shape);
 
   /// An offset from the pixel's centre with the filter's density, from `u`, uniform in [0, 1)². Each component of the
-  /// offset depends on the same component of `u` only, and increases with it. Inverts the distribution to 1e-8, in
-  /// about 10 ns.
+  /// offset depends on the same component of `u` only, and increases with it. Exact to 1e-8.
   Eigen::Vector2d sample(const Eigen::Vector2d& u) const { return {sample(u.x()), sample(u.y())}; }
 
  private:

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -43,11 +42,10 @@ AlignedBox2d extent_of(const std::vector<Mark>& marks) {
   AlignedBox2d box;
   for (const Mark& mark : marks) {
     const Vector2d half = Vector2d::Constant(mark.width / 2);
-    if (mark.text.empty()) {
+    if (mark.text.empty())
       box.extend((mark.from.cwiseMin(mark.to) - half).eval()).extend((mark.from.cwiseMax(mark.to) + half).eval());
-    } else {
+    else
       box.extend(mark.from).extend(Vector2d(mark.from + Vector2d(text_width(mark.text, mark.width), -mark.width)));
-    }
   }
   return box;
 }

@@ -15,8 +15,7 @@ namespace tensorray {
 
 // All functions draw over the first three channels of a picture; a channel "A" becomes opaque under what they draw. The
 // picture may be scene-linear or display-referred; 1 is taken as white. They draw black on light grounds and white on
-// dark ones, with a thin outline of the other. Capital letters have 0.024 of the shorter side, and no less than 11
-// pixels. Parts outside the picture are cut off.
+// dark ones, with a thin outline of the other. Capital letters have 0.024 of the shorter side, 11 pixels at least.
 
 /// The greatest length of the form 1, 2 or 5 times a power of ten that is not above `limit` (finite, > 0).
 double round_length(double limit);

@@ -49,10 +49,8 @@ ColorKey direction_key();
 // Both functions draw into the first three channels of a picture. A channel "A" becomes opaque in proportion to the
 // opacity of the panel. The legend is on a translucent panel at the middle of the right edge; its size is proportional
 // to the shorter side of the picture. The panel is dark with white text, or light with black text, whichever is closer
-// to the picture behind it. The picture may be scene-linear or display-referred; 1 is taken as white. Parts outside the
-// picture are cut off.
-// @throw std::invalid_argument unless the picture begins with R, G, B; if the range is empty or not finite; if the bar
-// has no colours or the key no entries.
+// to the picture behind it. The picture may be scene-linear or display-referred; 1 is white.
+// @throw std::invalid_argument unless the picture begins with R, G, B; if the range, the bar or the key is empty.
 
 void draw_color_bar(Image& image, const ColorBar& bar);
 void draw_color_key(Image& image, const ColorKey& key);

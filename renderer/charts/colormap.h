@@ -8,9 +8,8 @@
 
 namespace tensorray {
 
-/// Colour maps in which equal steps of the value look equally large. In the sequential maps lightness increases from
-/// end to end, so that they also work when printed in grey. Each map interpolates control points of the published
-/// table, rounded to 8 bits:
+/// Colour maps in which equal steps of the value look equally large. In sequential maps lightness increases, so that
+/// they also work in grey. Each map interpolates control points of the published table, rounded to 8 bits:
 /// - `viridis`, `magma`, `inferno`, `plasma` (dark to light): S. van der Walt and N. Smith 2015, CC0, as in matplotlib.
 /// - `cividis` (blue to yellow, the same to readers with a colour vision deficiency): J. Nuñez, C. Anderton and
 ///   R. Renslow, Optimizing colormaps with consideration for color vision deficiency, PLOS ONE 13(7), 2018.
@@ -59,10 +58,8 @@ struct RangeChoice {
 /// up most of the colours. Values that are not finite are ignored; on a logarithmic scale, values that are not above
 /// zero too. If the two percentiles are equal, the range covers all values. If all values are equal (or too close to be
 /// distinguished), the range surrounds them: it extends by half of the value to both sides, or on a logarithmic scale
-/// from half to twice the value. If there are no values, or all are zero, it is 0 to 1 (symmetric: −1 to 1;
-/// logarithmic: 1 to 10).
-/// @throw std::invalid_argument unless 0 ≤ low_percentile < high_percentile ≤ 100, or if both symmetric and
-/// logarithmic.
+/// from half to twice the value. Without values but zero it is 0 to 1 (−1 to 1; 1 to 10).
+/// @throw std::invalid_argument unless 0 ≤ low_percentile < high_percentile ≤ 100, or if symmetric and logarithmic.
 ValueRange choose_range(std::vector<double> values, const RangeChoice& choice = {});
 
 }  // namespace tensorray

@@ -12,8 +12,7 @@ namespace tensorray {
 
 /// Draws one line of text over the first channels of `image`, anti-aliased. The stroke width is an eighth of the
 /// height. All digits have the same width. Descenders, brackets and bars reach a quarter of the height below the base
-/// line; nothing is higher than a capital letter. The text is UTF-8; a character that is not printable ASCII becomes a
-/// small box.
+/// line; nothing is higher than a capital letter. The text is UTF-8; what is not printable ASCII becomes a box.
 /// @param position  Lower left corner of the line (on the base line), in pixels from the upper left corner of the
 ///                  picture. It is continuous: pixel (x, y) covers [x, x+1) × [y, y+1).
 /// @param height    Height of a capital letter, in pixels. Parts outside the picture are cut off.

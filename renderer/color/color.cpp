@@ -15,7 +15,6 @@
 #include "base/text/text.h"
 #include "renderer/color/chromaticities.h"
 #include "renderer/color/file_colors.h"
-#include "renderer/color/icc_profile.h"
 
 namespace OCIO = OCIO_NAMESPACE;
 
@@ -217,6 +216,10 @@ DisplayEncoding encoding_of(const OCIO::Config& config, const std::string& displ
 }
 
 }  // namespace
+
+const char* const builtin_color_config =
+#include "renderer/color/builtin_config.inc"
+    ;
 
 const char* const builtin_config_word = "built-in";
 

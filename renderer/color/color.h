@@ -19,8 +19,7 @@ namespace tensorray {
 /// The matrix from linear Rec.709 (ITU-R BT.709, white D65) to XYZ. White has Y = 1.
 Eigen::Matrix3d rec709_to_xyz();
 
-/// The config that is part of the program, as text, and its name. It refers to no other file and needs no OpenColorIO
-/// newer than 2.1.
+/// The config that is part of the program, as text, and its name. It refers to no other file and needs OpenColorIO 2.1.
 extern const char* const builtin_color_config;
 extern const char* const builtin_config_word;
 
@@ -57,8 +56,7 @@ class ColorManagement {
 
   /// The 3x3 matrix from XYZ to the working space (role `scene_linear`). XYZ is relative to D65: the XYZ of the D65
   /// white (Y = 1) becomes the working space's white (1, 1, 1). The working space is found by the config's role
-  /// `aces_interchange` or `cie_xyz_d65_interchange`. If the config has neither, scene_linear is assumed to have the
-  /// primaries of Rec.709.
+  /// `aces_interchange` or `cie_xyz_d65_interchange`. Without both, scene_linear has Rec.709's primaries.
   Eigen::Matrix3d xyz_to_working() const;
 
   /// As xyz_to_working, but adapts `white` (XYZ, Y > 0) to D65 first (Bradford), so that it becomes neutral. If one of
@@ -68,15 +66,13 @@ class ColorManagement {
   Eigen::Matrix3d xyz_to_working_adapted(const Eigen::Vector3d& white) const;
 
   /// Applies the display and view in place to a scene-linear picture whose first channels are R, G, B. Alpha and other
-  /// channels do not change. Values outside the range of the display are not clipped here but by the writer. Runs on
-  /// all threads.
+  /// channels do not change. The writer clips values. Runs on all threads.
   /// @throw std::invalid_argument if the picture does not begin with R, G, B.
   void to_display(Image& image) const;
 
   /// The colour space of a picture file. If `wanted` (a name, an alias or a role) is not empty, it is that space.
   /// Otherwise the file rules of the user's config decide, if one other than the default rule matches. Otherwise floats
-  /// are scene_linear, and integers have the piecewise sRGB curve on Rec.709 primaries, under one of the usual names of
-  /// that space in configs.
+  /// are scene_linear, and integers have the piecewise sRGB curve on Rec.709 primaries, under a usual name.
   /// @throw std::runtime_error if the config does not have the space; the message lists the spaces that it has.
   std::string texture_space(const std::filesystem::path& file, bool integer, const std::string& wanted) const;
 
@@ -86,8 +82,7 @@ class ColorManagement {
   ColorConversion to_working(const std::string& space) const;
 
   /// The conversion of a picture file: that of texture_space if a space is wanted or a file rule matches; otherwise
-  /// what the file says of its colours (file_colors.h); otherwise that of texture_space. Tags that cannot be followed
-  /// become a warning in `notes`.
+  /// what the file says of its colours (file_colors.h); otherwise that of texture_space. `notes` get warnings of tags.
   ColorConversion picture_conversion(const std::filesystem::path& file, const NativeImage& image,
                                      const std::string& wanted, std::vector<std::string>& notes) const;
 

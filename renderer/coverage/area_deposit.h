@@ -11,8 +11,8 @@
 
 namespace tensorray {
 
-/// Sums of four planes, pixel by pixel: those of pixel x of row y, counted from the first row that is kept, are at
-/// [4 (y · stride + x)].
+/// Sums of four planes, pixel by pixel: those of pixel x of row y, counted from the first row that is kept, are at [4
+/// (y · stride + x)].
 struct DepositPlanes {
   static constexpr std::size_t count = 4;
   std::uint64_t* sums = nullptr;
@@ -33,8 +33,7 @@ struct EdgeBatch {
   alignas(64) double density[capacity];
 };
 
-/// Adds the edges, with the part `plane_weights` of them to each plane. An edge has the same sums, bit for bit, in any
-/// batch, whatever rows are kept.
+/// Adds the edges, with the part `plane_weights` of them to each plane. Sums are the same, bit for bit, in any batch.
 void deposit_edges(const EdgeBatch& batch, const double* plane_weights, const DepositPlanes& planes);
 
 /// Adds polygons of even density to four planes of pixels, edge by edge.
@@ -42,8 +41,7 @@ void deposit_edges(const EdgeBatch& batch, const double* plane_weights, const De
 /// An edge that goes down adds its density to the area between it and the right border of the plate, and one that goes
 /// up takes it away. So the edges of a polygon, in order, leave the density within it. The edge between two polygons is
 /// added once, with the difference of their densities. Each pixel gets the part of this area that it contains; a last
-/// pass sums each row from the left. (Font rasterisers draw outlines this way.) The cost grows with the length of the
-/// edges, not with the area.
+/// pass sums each row from the left. (Font rasterisers draw outlines this way.) The cost grows with the edges' length.
 ///
 /// Sums are integers, in units of 2^-48 of the power 1, and wrap around. The result therefore does not depend on the
 /// order of the edges, nor on how they are divided among several deposits that are added afterwards.
@@ -71,8 +69,7 @@ class AreaDeposit {
   ///                 other sense.
   void add_edge(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double density);
 
-  /// Adds `power` to the pixel that contains `at`, if there is one. A point on the right or lower edge counts as
-  /// inside.
+  /// Adds `power` to the pixel that contains `at`, if any. A point on the right or lower edge is inside.
   void add_point(const Eigen::Vector2d& at, double power);
 
   /// Adds the edges that wait.
@@ -81,8 +78,7 @@ class AreaDeposit {
   /// The sums of the kept rows, which have no meaning of their own. Call flush() before.
   const std::vector<std::uint64_t>& sums() const { return sums_; }
 
-  /// Adds the sums of a deposit of the same rows, maybe of another process. @throw std::invalid_argument if it is of
-  /// other rows.
+  /// Adds the sums of a deposit of the same rows. @throw std::invalid_argument if it is of other rows.
   void add(const std::vector<std::uint64_t>& sums);
 
   /// The power of each pixel of a row, in one plane: adds it up from deposits of the same rows that have been flushed.

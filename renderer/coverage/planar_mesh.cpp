@@ -27,8 +27,7 @@ double size(const Eigen::AlignedBox2d& box) {
 }
 
 /// A few roundings of the largest coordinate: points that callers compute on an edge are off it by this much. It is
-/// more than the errors of `weights` below, so a point near an edge that two triangles share is in at least one of
-/// them.
+/// more than the errors of `weights` below, so a point near a shared edge is in one of both.
 double rounding(const Eigen::AlignedBox2d& box) {
   if (box.isEmpty()) return 0;
   return 16 * epsilon * box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();

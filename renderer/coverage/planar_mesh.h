@@ -29,8 +29,7 @@ class PlanarMeshSearch {
   explicit PlanarMeshSearch(const PlanarMesh& mesh);
 
   /// Sets `hits` to all triangles that cover `point`, in order of their indices. A point on an edge, up to the rounding
-  /// of double precision at the mesh's largest coordinate, is found in all triangles that share the edge. No point
-  /// falls between them.
+  /// of double precision at the mesh's largest coordinate, is found in all triangles that share it.
   void find(const Eigen::Vector2d& point, std::vector<PlanarHit>& hits) const;
 
  private:

@@ -36,16 +36,13 @@ struct DensitySettings {
 ///
 /// The Gaussian is a cubic B-spline about each photon, which `finish` blurs with a Gaussian of the variance τ² − ⅓:
 /// that of the spline is ⅓ wherever the photon is. The error is at most 1e-3 of the peak of the kernel at τ = 2, and
-/// falls with τ⁴. For a smaller τ the Gaussian itself is added, at the middles of the pixels. Both are cut off
-/// beyond 4.5 τ, and normalised.
+/// falls with τ⁴. For a smaller τ the Gaussian itself is added, at the middles of the pixels. Both end at 4.5 τ.
 ///
-/// Sums are integers, in units of 2^-34 of a photon: they do not depend on the order of the photons, and sums of parts
-/// of the photons can be added. A pixel has room for 2^29 photons.
+/// Sums are integers, in units of 2^-34 of a photon: in any order, and of parts. A pixel has room for 2^29 photons.
 class DensityEstimator {
  public:
   /// @param colors  One colour per channel, or empty.
-  /// @throw std::invalid_argument if a size is < 1 or > 65000, tau is out of range, or only some channels have a
-  /// colour.
+  /// @throw std::invalid_argument if a size is < 1 or > 65000, tau is out of range, or some channels have no colour.
   DensityEstimator(int width, int height, int channels, const DensitySettings& settings,
                    const std::vector<Eigen::Vector3d>& colors = {});
 
@@ -61,8 +58,7 @@ class DensityEstimator {
   /// there are not so many.
   void copy_sums(Archive& archive);
 
-  /// Returns weight per pixel. @param weight  The weight of one photon. Runs on all threads; the result does not depend
-  /// on their number.
+  /// Returns weight per pixel. @param weight  The weight of one photon. Runs on all threads.
   Film finish(double weight = 1) const;
 
  private:

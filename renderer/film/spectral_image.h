@@ -13,8 +13,7 @@
 namespace tensorray {
 
 /// Converts a film whose channel k is `bands[k]` to colours relative to the undisturbed beam (1: undisturbed). The
-/// picture has the channels R, G, B; each pixel is `xyz_to_rgb` times Σ_k film_k xyz_k. Undisturbed light has Y = 1.
-/// Runs on all threads; the result does not depend on their number.
+/// picture has the channels R, G, B; each pixel is `xyz_to_rgb` times Σ_k film_k xyz_k. Runs on all threads.
 /// @throw std::invalid_argument unless the film has one channel per band.
 Image linear_image(const Film& film, const std::vector<Band>& bands, const Eigen::Matrix3d& xyz_to_rgb);
 
@@ -32,12 +31,10 @@ struct SpectralImage {
 
 /// The film as spectral irradiance or radiance, in the layout of Fichet et al. 2021 ("An OpenEXR Layout for Spectral
 /// Images", JCGT 10(3)). The first channels are R, G, B as in `linear_image`, which let other programs show the
-/// picture. Then follows one channel per band, such as "S0.550,000000nm", with the values film_k · beam · power_k /
-/// width_k. Write it as EXR.
+/// picture. Then follows one channel per band, such as "S0.550,000000nm", with film_k · beam · power_k / width_k.
 /// @param film             Relative to the undisturbed beam (1: undisturbed), one channel per band.
 /// @param quantity         Decides the unit in the header.
-/// @param beam             The quantity that a film of 1 means, over all bands, in W.m^-2 or W.m^-2.sr^-1. The result
-/// is
+/// @param beam  What a film of 1 means, over all bands, in W.m^-2 or W.m^-2.sr^-1. The result is
 ///                         in that unit per nm.
 /// @throw std::invalid_argument unless the film has one channel per band.
 SpectralImage spectral_image(const Film& film, const std::vector<Band>& bands, SpectralQuantity quantity, double beam,

@@ -1,7 +1,6 @@
 #pragma once
 /// @file renderer/images/formats.h
-/// How picture files are encoded and decoded, for image.h. Errors are std::runtime_error with one line; the caller adds
-/// the file's name.
+/// How picture files are encoded and decoded, for image.h. Errors are std::runtime_error without the file's name.
 
 #include <algorithm>
 #include <cstddef>
@@ -49,8 +48,7 @@ struct PictureFormat {
 
 /// Everything that the program does with OpenImageIO (renderer/openimageio). It is a library of its own, which is
 /// loaded from the folder of the program when the first picture is read, or written as JPEG or TIFF: Debian's
-/// OpenImageIO brings 260 libraries, which take a quarter of a second to load, and several seconds from a cold disk.
-/// Most renders do not wait for them.
+/// OpenImageIO brings 260 libraries, which take a quarter of a second to load, and seconds from a cold disk.
 struct ImagePlugin {
   void (*set_threads)(int threads);
   /// JPEG and TIFF.

@@ -4,16 +4,18 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <fstream>
 #include <mutex>
 #include <new>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 
 #include <dlfcn.h>
+#include <fcntl.h>
 
 #include "base/errors.h"
+#include "base/files/descriptor.h"
 #include "base/text/text.h"
 #include "renderer/images/formats.h"
 
@@ -52,17 +54,12 @@ Image clipped(const Image& image, bool alpha) {
   return result;
 }
 
-[[noreturn]] void throw_errno() { throw std::runtime_error(std::generic_category().message(errno)); }
-
 /// Also checks the result of closing the file: a full disk may be reported only then.
 void write_bytes(const std::filesystem::path& path, const std::vector<unsigned char>& bytes) {
-  std::FILE* const file = std::fopen(path.string().c_str(), "wb");
-  if (!file) throw_errno();
-  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size() && std::fflush(file) == 0;
-  const int write_error = errno;
-  const bool closed = std::fclose(file) == 0;
-  if (!written) errno = write_error;
-  if (!written || !closed) throw_errno();
+  Descriptor file = open_file(path, O_WRONLY | O_CREAT | O_TRUNC);
+  const std::string_view all(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (!file.is_open() || !write_whole(file.get(), all) || !file.close())
+    throw std::runtime_error(std::generic_category().message(errno));
 }
 
 /// Whether the end of a JPEG is missing. libjpeg fills the missing part with grey without an error.

@@ -1,7 +1,6 @@
 #pragma once
 /// @file renderer/images/image.h
-/// A picture in memory, and the only functions that read and write picture files (by OpenImageIO; EXR and PNG are
-/// written without it).
+/// A picture in memory, and the functions that read and write files (OpenImageIO; EXR and PNG without).
 
 #include <array>
 #include <cstddef>
@@ -40,8 +39,7 @@ inline bool begins_with_rgb(const Image& image) {
   return names.size() >= 3 && names[0] == "R" && names[1] == "G" && names[2] == "B";
 }
 
-/// Whether files with the ending of `path` can store alpha. The colours are then not multiplied by it (in EXR they
-/// are).
+/// Whether files with the ending of `path` can store alpha. Colours are then not multiplied by it (but in EXR).
 bool holds_alpha(const std::filesystem::path& path);
 
 /// Text for a picture's header, by attribute name.
@@ -117,8 +115,7 @@ struct NativeImage {
 /// luminance and chroma, R, G and B are computed.
 /// @param layer  Only the channels LAYER.R, ... count, the channel LAYER for grey, or the part of the file with this
 ///               name. Empty: any.
-/// @throw std::runtime_error naming the file and the reason; also if the file is cut off, has no such channels, or its
-/// values take more than 8 GiB.
+/// @throw std::runtime_error naming the file: it is cut off, has no such channels, or more than 8 GiB of values.
 NativeImage read_native_image(const std::filesystem::path& path, const std::string& layer = "");
 
 /// Adds to `notes` which part or layer was taken, and a warning if the picture has pixels that are not finite.
@@ -129,8 +126,7 @@ void add_notes(const std::filesystem::path& path, const NativeImage& image, std:
 NativeImage native_image(Image image);
 
 /// Writes R, G, B, A of `count` pixels to `rgba`, from (x, y) to the right, all within the picture. Integers are scaled
-/// to 0 to 1. Alpha is 1 if the picture has none. All four values are 0 where no pixels are stored. Values that are not
-/// finite become 0.
+/// to 0 to 1. Alpha is 1 if the picture has none. What is not stored, or not finite, is 0.
 void read_pixels(const NativeImage& image, int x, int y, int count, float* rgba);
 
 }  // namespace tensorray

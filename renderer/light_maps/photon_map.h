@@ -5,14 +5,17 @@
 /// 2011, "Progressive Photon Mapping: A Probabilistic Approach").
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "renderer/light_maps/photon_counts.h"
 #include "renderer/lights/photon_emitter.h"
+#include "renderer/surfaces/plate.h"
 #include "renderer/surfaces/surface_scene.h"
 
 namespace tensorray {
@@ -40,8 +43,7 @@ struct AreaPhotons {
   std::vector<bool> surfaces;  ///< By index: whether photons light them.
 };
 
-/// The photons of one pass, sorted by cells of a lattice, then by band, then by their order before. Immutable: any
-/// thread may use it.
+/// The photons of one pass, sorted by cells of a lattice, then by band, then by their order before. Immutable.
 class PhotonMap {
  public:
   /// @param radius  Within which a photon lights its surface, world units; > 0.
@@ -74,6 +76,24 @@ class PhotonMap {
   std::vector<Cell> cells_;  ///< By key, with an end.
 };
 
+/// Where photons went: they met a surface before the region (straight light, which photons do not count), landed on a
+/// surface after it, left everything, or could not be followed.
+enum class PhotonEnd { before, landed, escaped, stopped };
+constexpr int photon_end_count = 4;
+
+/// Photons that were emitted, counted there, and by their end, counted there: the sums are the same.
+struct PhotonCounts {
+  std::uint64_t emitted = 0;
+  std::array<std::uint64_t, photon_end_count> ends{};
+
+  PhotonCounts& operator+=(const PhotonCounts& more) {
+    emitted += more.emitted;
+    for (std::size_t end = 0; end < ends.size(); ++end) ends[end] += more.ends[end];
+    return *this;
+  }
+  bool operator==(const PhotonCounts& other) const { return emitted == other.emitted && ends == other.ends; }
+};
+
 /// The photons of all passes.
 struct PhotonMaps {
   std::vector<PhotonMap> passes;                  ///< The photons that `serves` wants.
@@ -102,5 +122,41 @@ void PhotonMap::visit(const SurfaceHit& point, int band, const Use& use) const {
       }
     }
 }
+
+// Light that reaches a surface on bent ways, computed beforehand.
+
+/// The irradiance of one side of a flat surface, or of the points of a body that straight light would reach if it met
+/// nothing else. A surface scatters it as if it arrived straight from the light, which is exact for diffuse materials.
+struct IrradianceMap {
+  std::uint32_t surface = 0;  ///< Index of the surface.
+  int light = -1;             ///< Index of the light that it comes from.
+  Plate plate;  ///< The part of the surface that has this light; elsewhere there is none. Of a body: a plane across the
+                ///< light, on which its points are projected.
+  std::shared_ptr<const SurfaceScene> body;  ///< The surface alone, if it is not flat.
+  double side = 1;                           ///< 1: the side of the plate's normal is lit; −1: the other side.
+  std::optional<Eigen::Vector3d> source;     ///< Of a point light: where it is.
+  Eigen::Vector3d towards = Eigen::Vector3d::UnitZ();  ///< Unit; from the surface to a distant light, on the lit side.
+  Eigen::Index bands = 0;
+  std::vector<float> irradiance;  ///< On `plate`, in every band, pixel after pixel.
+  std::vector<float> folds;       ///< On `plate`: the number of sheets of light that lie on each other.
+};
+
+/// Light that grazes a plate straight may come from above it when it is bent: it counts as if it came from above.
+constexpr double grazing_cosine = 0.05;
+
+/// Unit; from a point of the surface to the light.
+Eigen::Vector3d direction_towards(const IrradianceMap& light, const Eigen::Vector3d& point);
+
+/// Whether a point of the surface may have this light. @param ray  Direction of the ray that found the point.
+bool is_lit(const IrradianceMap& light, const Eigen::Vector3d& point, const Eigen::Vector3d& ray);
+
+/// The number of sheets at a point of the surface; 0 where there is no light.
+float folds_at(const IrradianceMap& light, const Eigen::Vector3d& point);
+
+/// Adds the irradiance of the plate at a point of the surface to `sum`, with linear interpolation between pixels; up to
+/// the plate's edge, its outermost pixels go on. On a body it is that of a surface that faces the light.
+/// @param sum  Of the bands from `first_band` on.
+void add_irradiance(const IrradianceMap& light, const Eigen::Vector3d& point, Eigen::ArrayXd& sum,
+                    Eigen::Index first_band = 0);
 
 }  // namespace tensorray

@@ -1,7 +1,6 @@
 #pragma once
 /// @file renderer/light_maps/photon_tracer.h
-/// Traces photons of directional lights, points and area lights through a bending region to the surfaces behind it and
-/// within it.
+/// Traces photons of directional, point and area lights through a bending region to surfaces behind and within it.
 
 #include <cstdint>
 #include <functional>

@@ -31,8 +31,7 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
   return hull;
 }
 
-/// Whether a point is inside a convex polygon or on its edge, to rounding: positions on the edge of a rectangular beam
-/// are in it.
+/// Whether a point is inside a convex polygon or on its edge, to rounding.
 bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& point) {
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Eigen::Vector2d& from = polygon[i];

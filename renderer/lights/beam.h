@@ -12,8 +12,7 @@ namespace tensorray {
 
 enum class BeamPattern { grid, stratified, sobol, random };
 
-/// Parallel light, or that of a point. It starts at the plane through `center`. Positions across it are in the frame
-/// (right, up) about `center`.
+/// Parallel light, or a point's. It starts at the plane through `center`; positions there are along (right, up).
 struct Beam {
   Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Unit; of a point's light, the axis of the beam.
   Eigen::Vector3d center = Eigen::Vector3d::Zero();       ///< World.
@@ -44,8 +43,7 @@ bool is_surrounded(const Eigen::Vector3d& source, const std::vector<Eigen::Vecto
 /// @throw std::invalid_argument if the points surround the source.
 Beam point_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& source);
 
-/// How much smaller lengths are where light starts than at a point, as straight light projects them; 1 if it is
-/// parallel.
+/// How much smaller lengths are where light starts than at a point, as straight light projects them; parallel: 1.
 double start_ratio(const Beam& beam, const Eigen::Vector3d& point);
 
 /// The area of a triangle of positions across the beam, or, seen from its source, the solid angle.

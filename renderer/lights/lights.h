@@ -59,8 +59,7 @@ using Light = std::variant<AreaLight, DirectionalLight, ConstantLight, Environme
 /// The triangles of an area light; null of other kinds.
 const TriangleMesh* emitting_mesh(const Light& light);
 
-/// The strength, in every band, of the light that a volume throws on surfaces, as photons or as a map; null: no light
-/// of this kind comes through it.
+/// The strength, in every band, of the light that a volume throws on surfaces; null: none of this kind comes through.
 const std::vector<float>* thrown_light(const Light& light);
 
 /// The direction, of any length, in which light comes straight to a point, of lights that are so small that they cast
@@ -88,8 +87,7 @@ struct LightSample {
 
 /// Chooses lights by their power, and then directions by the light. Immutable: any thread may use it.
 ///
-/// Constant light is never chosen: rays in the directions in which a material scatters find it with the least noise,
-/// and all choices are left for the other lights.
+/// Constant light is never chosen: the directions in which a material scatters find it with the least noise.
 ///
 /// Parallel light and points are deltas. All other lights that are infinitely far away form the background. The caller
 /// sees it as one light: its radiance is the sum over these lights, and its density is that of choosing a direction by
@@ -118,8 +116,7 @@ class LightSampler {
   double area_pdf(int light, const Eigen::Vector3d& point, const Eigen::Vector3d& position,
                   const Eigen::Vector3d& normal) const;
 
-  /// The radiance of an area light in every band, seen along `direction` (towards the light); nullptr if this side does
-  /// not emit.
+  /// The radiance of an area light in every band, seen along `direction` (towards it); null if this side does not emit.
   /// @param normal  Normal of the mesh at that position.
   const std::vector<float>* emitted(int light, const Eigen::Vector3d& normal, const Eigen::Vector3d& direction) const;
 
@@ -136,8 +133,7 @@ class LightSampler {
   /// the background's, and those of all area lights that a straight ray without obstacles meets.
   double direction_pdf(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const;
 
-  /// Whether directions of this sampler find light that equally likely directions would hardly find: that of area
-  /// lights and of pictures. Disks do not count.
+  /// Whether directions of this sampler find light that even ones would hardly find: of area lights and of pictures.
   bool is_concentrated() const;
 
   const std::vector<Light>& lights() const { return lights_; }  ///< Environments here hold no pictures.

@@ -98,8 +98,7 @@ EmittedPhoton PhotonEmitter::sample_beam(PathSampler& sampler) const {
   return {start, direction, spread * area(beam_.aperture)};
 }
 
-/// Even over the area, and over the cone about the ball; within the ball, as a diffuse surface shines. Starts a little
-/// off the light, which would stop it.
+/// Even over the area, and over the cone about the ball; within the ball, as a diffuse surface. Starts off the light.
 EmittedPhoton PhotonEmitter::sample_lamp(PathSampler& sampler) const {
   const auto triangle = static_cast<std::size_t>(lamp_->triangles.sample(sampler.next_1d()).cell);
   const Vector3d weights = square_to_triangle(sampler.next_2d());

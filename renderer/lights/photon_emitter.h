@@ -9,7 +9,6 @@
 
 #include "renderer/lights/beam.h"
 #include "renderer/lights/lights.h"
-#include "renderer/sampling/distribution.h"
 #include "renderer/sampling/sampling.h"
 
 namespace tensorray {

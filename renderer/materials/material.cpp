@@ -17,12 +17,7 @@ Diffuse prepare(const Diffuse& settings) { return settings; }
 
 /// The model of glass; null if the material is another one.
 const DielectricScattering* glass_of(const Material& material) {
-  using Glass = const DielectricScattering*;
-  return std::visit(Overloaded{[](const DielectricScattering& glass) -> Glass { return &glass; },
-                               [](const Diffuse&) -> Glass { return nullptr; },
-                               [](const ConductorScattering&) -> Glass { return nullptr; },
-                               [](const PrincipledScattering&) -> Glass { return nullptr; }},
-                    material.scattering);
+  return std::get_if<DielectricScattering>(&material.scattering);
 }
 
 /// Mirrors `w` in z if the material is opaque and wo is below the surface: opaque models need wo above it.
@@ -47,20 +42,11 @@ double refraction(const Material& material, const Vector3d& wi, const Vector3d& 
 
 bool is_glass(const Material& material) { return glass_of(material) != nullptr; }
 
-bool is_diffuse(const Material& material) {
-  return std::visit(
-      Overloaded{[](const Diffuse&) { return true; }, [](const ConductorScattering&) { return false; },
-                 [](const DielectricScattering&) { return false; }, [](const PrincipledScattering&) { return false; }},
-      material.scattering);
-}
+bool is_diffuse(const Material& material) { return std::holds_alternative<Diffuse>(material.scattering); }
 
 const BandValues* mean_fresnel(const Material& material) {
-  using Factor = const BandValues*;
-  return std::visit(Overloaded{[](const ConductorScattering& metal) -> Factor { return &metal.mean_fresnel; },
-                               [](const Diffuse&) -> Factor { return nullptr; },
-                               [](const DielectricScattering&) -> Factor { return nullptr; },
-                               [](const PrincipledScattering&) -> Factor { return nullptr; }},
-                    material.scattering);
+  const auto* const metal = std::get_if<ConductorScattering>(&material.scattering);
+  return metal ? &metal->mean_fresnel : nullptr;
 }
 
 Material make_material(const MaterialSettings& settings, const BandValues& reflectance) {

@@ -5,9 +5,8 @@
 #include <optional>
 #include <variant>
 
+#include "renderer/materials/metal_and_glass.h"
 #include "renderer/materials/principled.h"
-#include "renderer/materials/rough_conductor.h"
-#include "renderer/materials/rough_dielectric.h"
 #include "renderer/materials/scattering.h"
 
 namespace tensorray {
@@ -20,8 +19,7 @@ using MaterialSettings = std::variant<Diffuse, RoughConductor, RoughDielectric, 
 /// Made by `make_material`; immutable; threads may share it.
 ///
 /// Every material is reciprocal and conserves energy: it never scatters more light than arrives, from any direction. It
-/// scatters all light (to 2e-3) if the reflectance is 1 and the metal's n is 0. Opaque materials are the same from both
-/// sides.
+/// scatters all light (to 2e-3) if the reflectance is 1 and the metal's n is 0. Opaque ones have equal sides.
 struct Material {
   std::variant<Diffuse, ConductorScattering, DielectricScattering, PrincipledScattering> scattering;
   BandValues reflectance;  ///< For surfaces without their own colours: one value for each band, 0 to 1.
@@ -55,8 +53,7 @@ struct ViewedMaterial {
 ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
                       Eigen::Index first_band = 0);
 
-/// Sets f(wi, wo) in every band, without a cosine. It is 0 if a direction lies in the surface (z = 0), and on the far
-/// side of opaque materials.
+/// Sets f(wi, wo) in every band, without a cosine. It is 0 if a direction has z = 0, and behind opaque materials.
 /// @param view, reflectance  Of the point: `viewed` has made the one of the other.
 /// @param f  One value for each band; overwritten.
 /// @return `pdf`, which shares most of the work.

@@ -4,8 +4,7 @@
 /// height-correlated masking (Walter et al. 2007; Heitz 2014), and Fresnel's reflectances. Also tables over the angle,
 /// with which models return the light that more than one bounce between the facets would scatter.
 ///
-/// The frame is as in renderer/materials/scattering.h; wi and wo have z >= 0, not both 0. `alpha` is the width of GGX.
-/// There is no state: any thread may call every function.
+/// The frame is as in renderer/materials/scattering.h; wi and wo have z >= 0, not both 0. `alpha` is GGX's width.
 
 #include <algorithm>
 #include <array>
@@ -23,8 +22,7 @@ constexpr double min_roughness = 0.02;
 /// @throw std::invalid_argument naming `parameter` unless the roughness is 0 to 1.
 double ggx_alpha(double roughness, const char* parameter);
 
-/// Samples a normal of the facets visible from wo, with the density ggx_visible_pdf (Heitz 2018, "Sampling the GGX
-/// Distribution of Visible Normals").
+/// Samples a normal of the facets visible from wo, with the density ggx_visible_pdf (Heitz 2018).
 /// @param u  In [0, 1)².
 Eigen::Vector3d ggx_sample_visible(double alpha, const Eigen::Vector3d& wo, const Eigen::Vector2d& u);
 double ggx_visible_pdf(double alpha, const Eigen::Vector3d& wo, const Eigen::Vector3d& m);
@@ -32,8 +30,7 @@ double ggx_visible_pdf(double alpha, const Eigen::Vector3d& wo, const Eigen::Vec
 /// The fraction of a facet, visible from one direction, that is also visible from another one: G2 / G1(wo), <= 1.
 double ggx_shadowing(double alpha, double cosine_o, double cosine_i);
 
-/// Single bounces between two directions. Both are finite for cosines > 0, and f · cosine_i / pdf is
-/// ggx_shadowing.
+/// Single bounces between two directions. Both are finite for cosines > 0, and f · cosine_i / pdf is ggx_shadowing.
 struct GgxReflection {
   double f = 0;    ///< Of a surface of perfect mirrors.
   double pdf = 0;  ///< Of directions wi that result from reflecting wo at ggx_sample_visible.

@@ -19,8 +19,7 @@ struct Principled {
 
 /// The prepared material, the same from both sides. It is reciprocal and conserves energy layer by layer: the base does
 /// not receive what the coat reflects. A lobe in the base colour returns what both do not reflect in one bounce; it is
-/// the diffuse base of the dielectric and the multiple bounces of the metal. A white base (1 in all bands) returns all
-/// light, to 2e-3, for all parameters.
+/// the diffuse base of the dielectric and the multiple bounces of the metal. A white base returns all light, to 2e-3.
 struct PrincipledScattering {
   double metallic = 0;
   double alpha = 1;

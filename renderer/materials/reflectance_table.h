@@ -12,8 +12,7 @@
 namespace tensorray {
 
 /// The spectra of a ReflectanceModel at the nodes of a grid of colours, with linear interpolation. Colour is linear in
-/// the spectrum, so the interpolated spectrum has the interpolated colour; it is exact if the spectra at the nodes are.
-/// Immutable; threads may share it.
+/// the spectrum, so the interpolated spectrum has the interpolated colour; if the nodes' are exact. Immutable.
 class ReflectanceTable {
  public:
   /// Takes 10 to 100 ms.

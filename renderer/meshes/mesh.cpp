@@ -36,8 +36,7 @@ VertexKey key_of(const MeshWithNormals& mesh, std::uint32_t vertex) {
   return {P.x(), P.y(), P.z(), N.x(), N.y(), N.z()};
 }
 
-/// Joins equal vertices, which files often repeat (for normals, or for each mesh). Drops triangles of zero area and
-/// vertices that no triangle uses.
+/// Joins equal vertices, which files often repeat. Drops triangles of zero area and vertices that no triangle uses.
 MeshWithNormals without_repeats(const MeshWithNormals& given) {
   MeshWithNormals result;
   std::unordered_map<VertexKey, std::uint32_t, VertexHash> indices;

@@ -8,13 +8,11 @@
 
 #include <Eigen/Geometry>
 
-#include "base/geometry/ply_writer.h"
 #include "base/geometry/triangle_mesh.h"
 
 namespace tensorray {
 
-/// Triangles and the normals that shading takes at their corners. A vertex where several normals meet is there several
-/// times, once for each.
+/// Triangles and the normals that shading takes at their corners. A vertex is there once for each of its normals.
 struct MeshWithNormals {
   TriangleMesh mesh;
   /// For each vertex, any length; zero: none is known. Empty: no vertex has one.
@@ -23,8 +21,7 @@ struct MeshWithNormals {
 
 /// Reads all meshes of a file as one mesh. Polygons are triangulated, vertices at equal positions are joined, unused
 /// vertices and triangles of zero area are dropped. Positions have the file's precision in .ply, and single precision
-/// in other formats. Formats that say their unit and axes (.gltf, .glb, .dae, .fbx) are read in metres with +z up; the
-/// numbers of the others are taken as they are.
+/// in other formats. Formats with unit and axes (.gltf, .glb, .dae, .fbx) are in metres with +z up.
 /// @throw std::runtime_error naming the file and the reason: missing, unreadable, no triangles, a vertex that is not
 /// finite in single precision.
 TriangleMesh read_mesh(const std::filesystem::path& path);
@@ -40,9 +37,8 @@ MeshWithNormals read_mesh_with_normals(const std::filesystem::path& path, std::o
 /// @param mesh  Vertices at equal positions are joined; no triangle has zero area.
 MeshWithNormals with_smooth_normals(const TriangleMesh& mesh, double angle);
 
-/// Writes a mesh in the format that the ending of `path` names. It writes in place and in pieces, so memory does not
-/// grow with the mesh.
-/// - `.ply`: as base/geometry/ply_writer.h.
+/// Writes a mesh in the format that the ending of `path` names. It writes in place and in pieces.
+/// - `.ply`: as base/geometry/triangle_mesh.h.
 /// - `.obj`: text; "v x y z" (with "r g b" from 0 to 1, which most programs read), "vn", "f a//a".
 /// Both formats keep positions in single precision, with the fewest digits that reproduce them (seven to nine). In
 /// .obj, colours have three decimals and normals four: the eye sees no finer difference. Only .ply keeps values.
@@ -54,8 +50,7 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, con
 /// The parallelepiped that `transform` makes of the box: twelve triangles that face outwards.
 TriangleMesh box_mesh(const Eigen::AlignedBox3d& box, const Eigen::Affine3d& transform);
 
-/// Checks that the mesh is closed (along every edge, as many triangles run one way as the other). Reverses all
-/// triangles if they face inwards.
+/// Checks that the mesh is closed (open_edges). Reverses all triangles if they face inwards.
 /// @throw std::invalid_argument with the number of open edges if the mesh is not closed, or if it encloses no volume.
 void require_closed(TriangleMesh& mesh);
 

@@ -33,15 +33,13 @@ MeshWithNormals read_obj(const std::filesystem::path& path);
 /// process, where .off files with faces of vertices that are not there are read with other ones. @throw also Cancelled.
 MeshWithNormals read_assimp_mesh(const std::filesystem::path& path);
 
-/// What `tensorray --read-mesh` does: reads the file in this process, and writes the mesh to `exchange`, in place and
-/// in the machine's byte order.
+/// What `tensorray --read-mesh` does: reads the file in this process, and writes the mesh to `exchange`, in place.
 void write_assimp_mesh(const std::filesystem::path& path, const std::filesystem::path& exchange);
 
 /// What assimp does not read rightly of glTF 2.0, prepared for it: files by their names, which stand beside a .gltf or
 /// .glb whose positions and normals are integers (KHR_mesh_quantization); gltf_in_memory_name, which is to be
 /// read instead, has floats. Empty if there are none, or the file is no glTF 2.0.
-/// @throw std::runtime_error that names an extension which is required, and whose geometry would be lost; or if
-/// integers are beyond their buffer.
+/// @throw std::runtime_error naming an extension that is required but not read, or integers beyond their buffer.
 std::map<std::string, std::string> gltf_in_memory(const std::filesystem::path& path);
 constexpr const char* gltf_in_memory_name = "tensorray.gltf";
 

@@ -102,8 +102,7 @@ void read_obj_statement(const Words& words, std::size_t line, ObjContents& conte
                              "\" is not read; of an .obj file only polygons are (v, vn, f)");
 }
 
-/// The words of a statement, up to a comment. A backslash at the end of a line continues it. @return whether there was
-/// a line.
+/// The words of a statement, up to a comment. A backslash at a line's end continues it. @return whether there was one.
 bool next_statement(std::istream& file, Words& words, std::size_t& line) {
   words.clear();
   std::string text;

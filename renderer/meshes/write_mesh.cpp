@@ -7,7 +7,7 @@
 #include <string>
 
 #include "base/errors.h"
-#include "base/files/file_in_pieces.h"
+#include "base/files/output_file.h"
 #include "base/text/text.h"
 #include "renderer/meshes/mesh.h"
 

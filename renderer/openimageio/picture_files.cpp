@@ -66,9 +66,8 @@ void require_likely_layout(const OIIO::ImageSpec& spec) {
                              std::to_string(spec.tile_height) + " pixels");
 }
 
-/// Reads channels of a part as `type` into `samples`, which holds them all.
-/// OpenImageIO's reader of TIFF reports success for strips that are cut off or damaged if it reads several at once.
-/// TIFF is therefore read line by line, which takes the same time.
+/// Reads channels of a part as `type` into `samples`, which holds them all. TIFF is read line by line: OpenImageIO does
+/// not notice damage in several strips.
 /// @throw std::runtime_error with the reader's first message. Some readers give none if a file is cut off.
 void read_samples(OIIO::ImageInput& input, int part, int first, int count, OIIO::TypeDesc type, void* samples) {
   const OIIO::ImageSpec spec = input.spec(part, 0);
@@ -182,8 +181,7 @@ void say_choice(OIIO::ImageInput& input, int part, NativeImage& image) {
 }
 
 /// Finds colours in the first part of a file, or of an EXR in the first part that has some: without a layer's name, or
-/// else of a layer. Grey is taken if there are no colours, by its name before any single channel (depth). @return the
-/// part.
+/// else of a layer. Without colours, grey is taken, by its name before any channel (depth).
 int find_colors(OIIO::ImageInput& input, NativeImage& image) {
   using Spec = const OIIO::ImageSpec&;
   const std::function<bool(Spec)> finders[] = {

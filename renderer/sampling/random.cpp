@@ -67,8 +67,7 @@ constexpr std::uint32_t sobol_1(std::uint32_t reversed) {
   return x;
 }
 
-/// Dimension 2 has the primitive polynomial x² + x + 1, first numbers 1 and 3: its direction numbers follow a
-/// recurrence.
+/// Dimension 2 has the primitive polynomial x² + x + 1, first numbers 1 and 3: a recurrence.
 constexpr std::uint32_t sobol_2(std::uint32_t reversed) {
   std::uint32_t x = 0, number = 0x80000000u, next = 3u << 30;
   for (; reversed != 0; reversed <<= 1) {

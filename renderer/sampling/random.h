@@ -18,8 +18,7 @@ double random_uniform(std::uint64_t key, std::uint32_t dimension);
 /// Point `index` of the Sobol sequence, shuffled and Owen-scrambled by `seed` (Burley 2020, "Practical Hash-based Owen
 /// Scrambling"). The first 2^32 points are distinct. The shuffle maps each aligned block of 2^k indices to another such
 /// block. Therefore the first 2^k points have one point in each elementary interval (each box 2^-i by 2^-j, i + j = k)
-/// of dimensions (0, 1). In all three dimensions, boxes of volume 2^(1-k) contain two points each; no binary sequence
-/// does better in three dimensions. Higher dimensions are an error.
+/// of dimensions (0, 1). In all three dimensions, boxes of volume 2^(1-k) contain two points each. Others are an error.
 /// @return a multiple of 2^-32 in [0, 1)
 /// @throw std::invalid_argument if dimension > 2.
 double sobol(std::uint64_t seed, std::uint32_t index, std::uint32_t dimension);

@@ -8,8 +8,7 @@ namespace {
 using Eigen::Vector3d;
 
 /// Whether something blocks the light of a sample of `point`. The ray starts a little off `point`, so it must be aimed
-/// again at the position on the light: otherwise it would meet the light itself too early where it is seen at a grazing
-/// angle.
+/// again at the position on the light: otherwise it would meet the light too early at a grazing angle.
 bool is_shadowed(const SurfaceScene& surfaces, const LightSample& light, const Vector3d& start, const Vector3d& point) {
   if (std::isinf(light.distance)) return surfaces.occluded(start, light.direction);
   const Vector3d way = point + light.distance * light.direction - start;

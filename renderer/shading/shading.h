@@ -13,7 +13,6 @@
 
 #include <Eigen/Core>
 
-#include "renderer/light_maps/irradiance_map.h"
 #include "renderer/light_maps/photon_map.h"
 #include "renderer/lights/bending_region.h"
 #include "renderer/lights/lights.h"
@@ -42,16 +41,11 @@ struct ShadingSettings {
   DirectLight direct = DirectLight::both;
   int max_depth = 8;  ///< Most surfaces at which a path scatters; >= 0. 1: direct light only.
   /// After this many surfaces, a path that carries less than a tenth of its luminance may end at random (Russian
-  /// roulette); >= 1. With 1, dark surfaces would be noisy under a sky, whose light only the material's samples
-  /// find.
+  /// roulette); >= 1. With 1, dark surfaces would be noisy under a sky, whose light only the material's samples find.
   int roulette_depth = 2;
   /// Greatest luminance that light scattered twice or more adds, for each sample and surface; 1 is the luminance of the
-  /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). With the
-  /// default, one such path adds at most 10 / samples to a pixel: at 64 samples 0.16, which is 20 times the
-  /// neighbouring pixels only if these are below 0.008. Light that is scattered once, which lights most of a picture,
-  /// is never changed. Light that many surfaces exchange is rarely changed. A bent path has
-  /// one band: it is limited as if all bands had its radiance, since bright pixels would otherwise stay in bands that
-  /// the eye hardly sees.
+  /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). Light that is
+  /// scattered once is never changed. A bent path is limited as if all bands had its radiance.
   double indirect_clamp = 10;
   /// The angle of a pixel as the camera sees it, radians. Bent rays of the camera may be off by a fifth of it, so that
   /// rays of some bands are interpolated between those of others. 0: the ray of each band is traced.
@@ -67,8 +61,7 @@ struct ShadedScene {
   /// Where light bends; null: it is straight everywhere. Surfaces get the light of directional lights and points
   /// through the region from `irradiance_maps` or `photons`; only rays of the camera look for it themselves.
   const BendingRegion* region = nullptr;
-  /// Bands that a ray of the camera, and one that surfaces have scattered, follows into the region. Both divide the
-  /// number of bands.
+  /// Bands that a ray of the camera, and a scattered one, follows into the region. Both divide the number of bands.
   int bands_per_view = 1, bands_per_bounce = 1;
   std::vector<IrradianceMap> irradiance_maps = {};  ///< Light that was traced to surfaces through the region.
   /// The same for surfaces without a map; each sample uses one of the passes. Null or without passes: none.
@@ -134,8 +127,7 @@ class RayShader {
   /// In every band.
   Eigen::ArrayXXd::ConstColXpr radiance(std::size_t ray) const { return layer(ray, -1); }
 
-  /// Parts of `radiance`: if there are ShadedScene::irradiance_maps or photons, what these have lit; then the light of
-  /// each group.
+  /// Parts of `radiance`: what irradiance_maps and photons have lit, if there are any; then the light of each group.
   Eigen::ArrayXXd::ConstColXpr layer(std::size_t ray, int layer) const;
 
   const RayView& view(std::size_t ray) const;

@@ -32,8 +32,7 @@ void add_irradiance_maps(Wavefront& front, const PathState& path) {
   }
 }
 
-/// The map from which a surface takes its photons: each sample takes one by chance, so that the noise of photons is
-/// seen as that of samples.
+/// The map from which a surface takes its photons: by chance, so that photons' noise is that of samples.
 const PhotonMap& photon_map(const ShadedScene& scene, const PathState& path) {
   PathSampler choice = path.sampler;
   choice.dimension = first_photon_dimension + static_cast<std::uint32_t>(path.depth);
@@ -57,8 +56,7 @@ double photon_mis_weight(const Wavefront& front, const Vertex& vertex, const Pho
 }
 
 /// Sets the sums of the light of photons at the last surface of the path: for each group and for lights without one,
-/// that of area lights after that of others. A diffuse surface scatters all photons of its side alike: its sums are
-/// without its reflectance.
+/// that of area lights after that of others. Those of a diffuse surface are without its reflectance.
 void sum_photons(Wavefront& front, const PathState& path, bool diffuse) {
   const Vertex& vertex = path.vertex;
   const PhotonMap& map = photon_map(front.scene, path);

@@ -1,7 +1,6 @@
 #pragma once
 /// @file renderer/shading/wavefront.h
-/// The stages of shading, and what they share: the camera's rays that are shaded together, the light that they have
-/// seen, and the path of light that is followed.
+/// The stages of shading, and what they share: rays that are shaded together, the light they have seen, and its path.
 
 #include <algorithm>
 #include <cstdint>
@@ -66,8 +65,7 @@ struct WaitingPath {
   bool seeks_light = false;  ///< It brings light to a surface, and ends; otherwise, the path continues.
   double share = 1;          ///< Bands of the path for which each bent ray stands.
   double stands_for = 1;     ///< Bands of the camera's ray for which it stands.
-  /// Of the light that is met next, among the techniques without photons. A path that seeks light has it in its
-  /// throughput.
+  /// Of the light that is met next, among techniques without photons; of a path that seeks light, in its throughput.
   double mis_weight = 1;
   PhotonMis photons;
   std::size_t first = 0, last = 0;                       ///< Its bent rays.
@@ -139,16 +137,14 @@ void set_reflectance(const ShadedScene& scene, const SurfaceHit& hit, Eigen::Ind
 /// @param reflectance  Of the surface, in all bands; changed.
 Eigen::Vector3f albedo(const ShadedScene& scene, const SurfaceHit& hit, BandValues& reflectance);
 
-// The stages of shading, in the order in which a path goes through them. Each adds the light that it finds to the
-// batch.
+// The stages of shading, in the order in which a path goes through them. Each adds the light that it finds.
 
 // scattered_paths.cpp: paths from their first surface on.
 
 /// Adds the light that the surface which the path has met sends to the camera, as ShadingSettings::shading says.
 void shade_surface(Wavefront& front, PathState& path);
 
-// traced_light.cpp: light that was traced to surfaces beforehand, as maps of irradiance (of suns and points on plates
-// and bodies) and as maps of photons.
+// traced_light.cpp: light that was traced to surfaces beforehand, as maps of irradiance and as maps of photons.
 
 /// Adds such light that the last surface of the path scatters.
 void add_traced_light(Wavefront& front, PathState& path);
@@ -182,14 +178,12 @@ double material_mis_weight(const ShadingSettings& settings, double material_pdf,
   return 1 / (1 + ratio * ratio);
 }
 
-// bent_paths.cpp: paths whose rays enter the region. They wait there, and are then traced together: one call with many
-// rays is faster than many calls.
+// bent_paths.cpp: paths whose rays enter the region. They wait there, and are then traced together, which is faster.
 
 /// Whether a ray enters the region before it meets something at `distance`.
 bool enters_region(const ShadedScene& scene, const StraightRay& ray, double distance);
 
-/// Lets a path wait at the region, in its band; a path of all bands, in some of them, evenly spaced. Successive samples
-/// of a pixel take different bands.
+/// Lets a path wait at the region, in its band; a path of all bands, in some, evenly spaced, others for each sample.
 /// @param throughput  Of the path, or of light that it seeks; in its bands.
 /// @param waiting     With `seeks_light`, `mis_weight` and `photons`.
 void wait_at_region(Wavefront& front, const PathState& path, const StraightRay& ray, const BandValues& throughput,

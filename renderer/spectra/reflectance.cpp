@@ -96,8 +96,7 @@ Fit descend(const std::vector<BandColor>& bands, const Vector3d& rgb, const Vect
   return best;
 }
 
-/// Goes from grey to the colour in steps and solves for each colour on the way. This is slow, but it also converges
-/// where few bands make the spectra abrupt.
+/// Goes from grey to the colour in steps and solves for each. It is slow, but converges with few bands, too.
 Fit march(const std::vector<BandColor>& bands, const Vector3d& rgb) {
   constexpr int parts = 8;
   const Vector3d grey = Vector3d::Constant(0.5);

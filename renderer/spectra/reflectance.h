@@ -32,9 +32,8 @@ struct BandColor {
 /// Accuracy: exact for every colour that some reflectance, however abrupt, can have in these bands (to 1e-4 at the
 /// border of these colours). With 10 or more equal bands from 380 to 730 nm of D65, A, E or a black body of 5500 K this
 /// is all of Rec.709 in [0, 1]. With 8 such bands no reflectance has the brightest saturated colours. Under D65, 0.8 %
-/// of the cube is then out of reach: green (0, 1, 0) and magenta (1, 0, 1) by 0.08 (ΔE 15 and 12), cyan and red by
-/// 0.03, yellow and blue by 0.02. Under A it is 0.2 %, by at most 0.02 (blue). With 9 bands it is 0.3 %, by at most
-/// 0.03. A fifth of ACEScg in [0, 1] is out of reach with any number of bands.
+/// of the cube is then out of reach, by at most 0.08 (green and magenta). A fifth of ACEScg is with any number of
+/// bands.
 class ReflectanceModel {
  public:
   /// @param bands       The bands of the light, as they are rendered.
@@ -46,8 +45,7 @@ class ReflectanceModel {
   /// below single precision. Otherwise the error is nearly the smallest possible one (mostly within 1e-4, at worst
   /// within 0.03). The spectrum is within [0, 1]. If a component of the colour is above 1, the spectrum is that of the
   /// colour divided by its largest component, multiplied by that component. Negative values count as 0. Black, and
-  /// colours that are not finite, give exactly 0. Grey (to 1e-6) gives exactly its constant mean. Takes about 1 µs with
-  /// 16 bands, and up to 20 times longer for colours out of reach.
+  /// colours that are not finite, give exactly 0. Grey (to 1e-6) gives exactly its constant mean. Takes about 1 µs.
   ReflectanceSpectrum spectrum(const Eigen::Vector3d& rgb) const;
 
  private:

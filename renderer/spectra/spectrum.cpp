@@ -1,6 +1,7 @@
 #include "renderer/spectra/spectrum.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -8,12 +9,22 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
-#include "renderer/spectra/cie_tables.h"
 
 namespace tensorray {
 namespace {
 
 constexpr double illuminant_min = 300, illuminant_max = 830;
+
+// Published tables (CIE 015): the 1931 2° standard observer (x̄, ȳ, z̄) for each nanometre, and the relative spectral
+// power of the standard illuminant D65 every 5 nm.
+// clang-format off
+constexpr std::array<double, 3 * 471> cie_1931_observer{
+#include "renderer/spectra/cie_1931_observer.inc"
+};
+constexpr std::array<double, 107> cie_d65{
+#include "renderer/spectra/cie_d65.inc"
+};
+// clang-format on
 
 std::string text(double number) {
   char digits[32];
@@ -66,8 +77,7 @@ std::vector<double> knots(const Spectrum& light, double min, double max) {
 }
 
 /// Integrates exactly over [min, max]: between knots the product of light and observer is quadratic, so that two Gauss
-/// points suffice. They lie inside the intervals; therefore jumps at the ends of the light and of the observer do no
-/// harm.
+/// points suffice. They lie inside the intervals: jumps at the ends do no harm.
 Amount integrate(const Spectrum& light, double min, double max) {
   Amount sum;
   const std::vector<double> ends = knots(light, min, max);

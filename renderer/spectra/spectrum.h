@@ -1,7 +1,6 @@
 #pragma once
 /// @file renderer/spectra/spectrum.h
-/// Spectra, the CIE 1931 observer, and the wavelength bands in which the renderer samples light.
-/// All wavelengths are in nanometres.
+/// Spectra, the CIE 1931 observer, and the bands in which the renderer samples light. Wavelengths are in nanometres.
 
 #include <filesystem>
 #include <string>

@@ -1,7 +1,6 @@
 #pragma once
 /// @file renderer/surfaces/embree_handles.h
-/// The only file that includes Embree; private to the scenes that use it. It hides the differences between Embree 3 and
-/// 4 and defines owning handles.
+/// The only file that includes Embree; private to the scenes that use it. Embree 3 and 4 have the same owning handles.
 
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>

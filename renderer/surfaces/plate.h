@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace tensorray {
 
@@ -37,10 +37,19 @@ struct Plate {
 };
 
 /// Where the line from `source` through a point meets the plane of the plate.
-Eigen::Vector3d projected_from(const Eigen::Vector3d& source, const Plate& plate, const Eigen::Vector3d& point);
+inline Eigen::Vector3d projected_from(const Eigen::Vector3d& source, const Plate& plate, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d normal = plate.normal(), way = point - source;
+  return source + normal.dot(plate.center - source) / normal.dot(way) * way;
+}
 
 /// A unit vector normal to `direction`: the normalised component of `up` across it. If `up` is parallel to `direction`
 /// or zero, +z replaces it, or +y if +z is also parallel.
-Eigen::Vector3d upright(const Eigen::Vector3d& direction, const Eigen::Vector3d& up);
+inline Eigen::Vector3d upright(const Eigen::Vector3d& direction, const Eigen::Vector3d& up) {
+  const Eigen::Vector3d along = direction.normalized();
+  const auto across = [&](const Eigen::Vector3d& axis) -> Eigen::Vector3d { return axis - axis.dot(along) * along; };
+  if (across(up).norm() > 1e-6 * up.norm()) return across(up).normalized();
+  if (across(Eigen::Vector3d::UnitZ()).norm() > 1e-6) return across(Eigen::Vector3d::UnitZ()).normalized();
+  return across(Eigen::Vector3d::UnitY()).normalized();
+}
 
 }  // namespace tensorray

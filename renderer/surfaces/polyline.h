@@ -13,8 +13,7 @@ struct Worst {
   std::size_t point = 0;
 };
 
-/// Returns which of the points 0 to count − 1 to keep, in order (Ramer 1972; Douglas and Peucker 1973). The first and
-/// the last point are always kept.
+/// Which of the points 0 to count − 1 to keep, in order, with both ends (Ramer 1972; Douglas and Peucker 1973).
 /// @param worst  worst(i, j): of the points between i and j. Every point that is left out has an error of at most 1
 ///               between its kept neighbours. Where no error is allowed, `worst` should return the first point that has
 ///               one, or the time is quadratic in the count.

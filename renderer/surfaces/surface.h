@@ -30,11 +30,9 @@ struct RoundCurves {
 };
 
 /// A surface with everything that shading and the auxiliary planes of a picture need. Vectors marked "for each point"
-/// have one value for each vertex of a mesh or point of curves, with linear interpolation between them; or they are
-/// empty.
+/// have one value for each vertex of a mesh or point of curves, linear between them, or none.
 ///
-/// Memory: 140 bytes for each triangle, the build of SurfaceScene included; measured on tubes of 5 million triangles
-/// with normals and colours.
+/// Memory: 140 bytes for each triangle, with the build of SurfaceScene (5 million triangles).
 struct ShadedSurface {
   std::variant<TriangleMesh, RoundCurves> shape;
   std::vector<Eigen::Vector3f> normals;  ///< For each point, meshes only; any length. Empty: flat triangles.

@@ -19,8 +19,7 @@ struct SurfaceHit {
   double distance = 0;  ///< Along the unit direction, world units.
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   /// Start of rays that leave an opaque surface: on the smooth surface that the normals of a mesh describe, which hides
-  /// that the triangles are flat (Hanika 2021, "Hacking the Shadow Terminator"). It is on the side that the ray came
-  /// from, at or above `position`.
+  /// that the triangles are flat (Hanika 2021, "Hacking the Shadow Terminator"). It is at or above `position`.
   Eigen::Vector3d lifted_position = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();          ///< Unit, geometric; points outwards.
   Eigen::Vector3d shading_normal = Eigen::Vector3d::Zero();  ///< Unit, interpolated; on the same side as `normal`.
@@ -48,8 +47,7 @@ struct SurfaceData {
 class SurfaceScene {
  public:
   /// @throw std::invalid_argument naming the surface by its index and the error: a vertex index or a count out of
-  /// range, a value that is not finite in single precision; std::runtime_error if Embree fails (out of memory,
-  /// unsupported processor).
+  /// range, a value that is not finite in single precision; std::runtime_error if Embree fails.
   explicit SurfaceScene(std::vector<ShadedSurface> surfaces);
 
   /// The nearest surface along the unit `direction`, from either side. Rays may start anywhere. There is no hit if the

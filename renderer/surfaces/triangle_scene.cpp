@@ -104,6 +104,15 @@ struct TriangleScene::State {
     return !((point - origin).array().abs() <= near * unit).all();
   }
 
+  /// Moves the start of a ray that is far away to the box. @return false if it does not meet it.
+  bool begin(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double max_distance,
+             double& min_distance) const {
+    if (!is_far(from + min_distance * direction)) return true;
+    const auto way = entry(box, from, direction);
+    if (way) min_distance = std::max(min_distance, *way);
+    return way && *way <= max_distance;
+  }
+
   RTCRayHit ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
                 double max_distance) const {
     // Embree finds no hits behind a ray's origin, so the ray starts at `min_distance`.
@@ -137,11 +146,7 @@ TriangleScene::TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
 std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
                                                   double min_distance, double max_distance) const {
   if (!state_->scene) return std::nullopt;
-  if (state_->is_far(from + min_distance * direction)) {
-    const auto way = entry(state_->box, from, direction);
-    if (!way || *way > max_distance) return std::nullopt;
-    min_distance = std::max(min_distance, *way);
-  }
+  if (!state_->begin(from, direction, max_distance, min_distance)) return std::nullopt;
   RTCRayHit ray = state_->ray(from, direction, min_distance, max_distance);
   embree::intersect(state_->scene.get(), ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
@@ -152,11 +157,7 @@ void TriangleScene::crossings(const Eigen::Vector3d& from, const Eigen::Vector3d
                               double max_distance, std::vector<TriangleCrossing>& crossings) const {
   crossings.clear();
   if (!state_->scene) return;
-  if (state_->is_far(from + min_distance * direction)) {
-    const auto way = entry(state_->box, from, direction);
-    if (!way || *way > max_distance) return;
-    min_distance = std::max(min_distance, *way);
-  }
+  if (!state_->begin(from, direction, max_distance, min_distance)) return;
   const auto add = [](void* user, const embree::MetTriangle& met) {
     const bool is_clear = std::min({met.u, met.v, 1 - met.u - met.v}) > clear_of_edges;
     static_cast<std::vector<TriangleCrossing>*>(user)->push_back(

@@ -39,8 +39,7 @@ struct TriangleCrossing {
 /// A ray that starts far away is first moved to the triangles, in double precision.
 class TriangleScene {
  public:
-  /// In units from the origin. Triangles beyond this are never met: products of three of their coordinates overflow in
-  /// single precision.
+  /// In units from the origin. Triangles beyond this are never met: products of three coordinates would overflow.
   static constexpr double reach = 1e12;
 
   /// @param meshes        May include meshes without triangles; queries number the meshes in this order.
@@ -62,13 +61,11 @@ class TriangleScene {
   void crossings(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
                  double max_distance, std::vector<TriangleCrossing>& crossings) const;
 
-  /// Sets `candidates` to the triangles that a ray meets, in order of mesh and triangle; some of them it misses by
-  /// single precision.
+  /// Sets `candidates` to the triangles that a ray meets, in order of mesh and triangle, in single precision.
   void along(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, std::vector<TriangleId>& candidates) const;
 
   /// Sets `candidates` to all triangles whose bounding boxes come within `radius` of the point, and some others, in
-  /// order of mesh and triangle. A radius of 1e-6 units makes up for single precision if coordinates are below one
-  /// unit.
+  /// order of mesh and triangle. 1e-6 units make up for single precision below one unit.
   void near(const Eigen::Vector3d& point, double radius, std::vector<TriangleId>& candidates) const;
 
  private:

@@ -12,7 +12,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
-#include "base/geometry/turn.h"
+#include "base/geometry/box.h"
 #include "renderer/surfaces/polyline.h"
 
 namespace tensorray {
@@ -43,8 +43,7 @@ int segments_for(double radius, double tolerance, const TubeSettings& settings) 
 }
 
 /// A point between two points of a tube. The centre is on the cubic that has the tube's direction at both points, with
-/// such a speed there that a circle's arc keeps its height. The ellipse turns with the direction, so that it keeps its
-/// size in a bend.
+/// such a speed there that a circle's arc keeps its height. The ellipse turns with the direction.
 TubePoint between(const TubePoint& a, const TubePoint& b, double t) {
   const Eigen::Vector3d from = axis(a), to = axis(b), chord = b.center - a.center;
   const double half_turn = std::sqrt(std::max(0.0, (1 + from.dot(to)) / 2));  // Its cosine.

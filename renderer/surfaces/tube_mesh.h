@@ -14,8 +14,7 @@ namespace tensorray {
 /// A point of a tube's axis with its ellipse center + x cos θ + y sin θ.
 struct TubePoint {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  /// Conjugate semi-diameters (semi-axes are a special case), not parallel; x × y points along the tube, towards its
-  /// end. Triangles join points of equal θ.
+  /// Conjugate semi-diameters (semi-axes are a special case), not parallel; x × y points to the tube's end.
   Eigen::Vector3d x = Eigen::Vector3d::Zero(), y = Eigen::Vector3d::Zero();
   double value = 0;  ///< Interpolated along the tube, for example for a colour.
   double shade = 0;  ///< Adds rings where it is not linear along the tube, as `value` does. The mesh does not store it.
@@ -42,8 +41,7 @@ struct TubeSettings {
   TubeCaps caps = TubeCaps::flat;  ///< Caps of solid tubes, and of the wires that run along tubes.
 
   /// Greatest distance between the triangles and the smooth tube. With curvature and the change of the ellipses it sets
-  /// the number of rings; with the size of the ellipses, the number of segments around them. The best choice is a
-  /// fraction of a pixel's size. 0: 1/50.
+  /// the number of rings; with the size of the ellipses, the number of segments around them. 0: 1/50.
   double tolerance = 0;
   int min_segments = 6;   ///< Fewest segments around an ellipse; >= 3.
   int max_segments = 64;  ///< Most segments around an ellipse; >= min_segments.

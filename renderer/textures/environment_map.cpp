@@ -41,8 +41,7 @@ Vector2d to_pixel(const Image& picture, const Vector3d& d) {
   return {turn * picture.width, fall * picture.height};
 }
 
-/// The texel at a position. The left and right edges are joined; a position that rounding moves beyond a pole is
-/// clamped.
+/// The texel at a position. The left and right edges are joined; positions beyond a pole are clamped.
 Vector2i texel_at(const Image& picture, const Vector2d& pixel) {
   const int x = static_cast<int>(std::floor(pixel.x())) % picture.width;
   return {x < 0 ? x + picture.width : x, std::clamp(static_cast<int>(std::floor(pixel.y())), 0, picture.height - 1)};

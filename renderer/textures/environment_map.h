@@ -7,13 +7,12 @@
 #include <Eigen/Core>
 
 #include "renderer/images/image.h"
-#include "renderer/sampling/distribution.h"
+#include "renderer/sampling/sampling.h"
 
 namespace tensorray {
 
 /// A latitude-longitude picture, as seen from inside. In its own frame +z is up: the upper edge is +z and the lower
-/// edge −z. The middle of the picture is +x; a quarter of its width to the left is +y, to the right −y. The left and
-/// right edges meet at −x.
+/// edge −z. The middle of the picture is +x; a quarter of its width to the left is +y. The edges are −x.
 struct EnvironmentLight {
   Image picture;                    ///< Any channels, scene-linear. Values that are negative or not finite count as 0.
   Eigen::MatrixXf channel_spectra;  ///< Bands × channels: the radiance in each band of a channel with value 1; >= 0.
@@ -22,13 +21,11 @@ struct EnvironmentLight {
 
 /// An EnvironmentLight that can be sampled. Texels are interpolated linearly. Sampling chooses a texel in proportion to
 /// its importance times its solid angle, then a direction uniformly within the texel. The density is bounded, also at
-/// the poles, and is above 0 wherever there is light. Memory: the picture, and 8 bytes per texel. Immutable: any thread
-/// may use it.
+/// the poles, and is above 0 wherever there is light. Memory: 8 bytes per texel more. Immutable.
 class EnvironmentMap {
  public:
   /// @param importance  Weight of each band, >= 0, such as its luminance.
-  /// @throw std::invalid_argument if the picture has no pixels, the shapes do not fit, a spectrum is negative or not
-  /// finite, or `to_world` is not a rotation.
+  /// @throw std::invalid_argument if there are no pixels, shapes or spectra do not fit, or `to_world` is no rotation.
   EnvironmentMap(EnvironmentLight light, const std::vector<float>& importance);
 
   /// Adds the radiance from `direction`. @param direction  Unit, world; from the viewer outwards.

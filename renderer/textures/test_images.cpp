@@ -37,8 +37,7 @@ double covered_length(double x, double period, double width) {
   return before * width + std::min(x - before * period, width);
 }
 
-/// The exact part of each of `size` pixels in a row that stripes cover. One of the stripes begins at `start`, measured
-/// from the middle of the row.
+/// The exact part of each of `size` pixels in a row that stripes cover, of which one begins at `start` from the middle.
 std::vector<double> stripes(int size, double period, double width, double start) {
   std::vector<double> shares(size);
   for (int x = 0; x < size; ++x) {

@@ -39,8 +39,7 @@ Cover cover(int i, int small, int large) {
 }
 
 /// Converts colours to scene-linear and multiplies them by alpha. If they are already multiplied, divides by alpha
-/// before the conversion, because its curves need plain colours. Colours with alpha 0 (a glow) are converted without
-/// division.
+/// before the conversion, because its curves need plain colours. Those of alpha 0 (a glow) are not divided.
 void convert(const NativeImage& image, const ColorConversion& conversion, int count, float* rgba) {
   const auto scale = [&](bool out) {
     for (float* pixel = rgba; pixel != rgba + static_cast<std::size_t>(count) * 4; pixel += 4)
@@ -57,11 +56,9 @@ void convert(const NativeImage& image, const ColorConversion& conversion, int co
 ///
 /// Levels of R, G, B, A with the colours multiplied by alpha. Level 0 is the picture. Each further level has half the
 /// width and height (rounded down, at least 1); the last level is a single pixel. A pixel of a level is the exact mean
-/// over its area for any size of the picture, so that no level aliases and all levels have the same mean.
-/// Memory: 21 bytes for each pixel of a picture of up to 16 million pixels, of which all levels are stored. Of a larger
-/// one, the picture as its file stores it, whose pixels are converted when they are read, and 5 bytes for each pixel,
-/// which its other levels take. The constructor computes stored levels on all threads. Immutable; any number of threads
-/// may read.
+/// over its area for any size of the picture. Memory: 21 bytes for each pixel of a picture of up to 16 million pixels,
+/// of which all levels are stored. Of a larger one, the picture as its file stores it, whose pixels are converted when
+/// they are read, and 5 bytes for each pixel, which its other levels take. Levels are made on all threads. Immutable.
 class ImagePyramid {
  public:
   /// @param conversion  From the colours of the picture to scene-linear colours.
@@ -256,8 +253,7 @@ int Texture::width() const { return state_->pyramid.width(0); }
 int Texture::height() const { return state_->pyramid.height(0); }
 
 /// Probes lie along the longer axis, at distances of at most the length of the shorter axis. Each probe is a bilinear
-/// tent in the level whose texels are as large as the shorter axis. Together the probes form a box as long as the
-/// longer axis.
+/// tent in the level whose texels are as large as the shorter axis. Together they form a box as long as it.
 Vector4f Texture::lookup(const Vector2d& st, const Matrix2d& footprint) const {
   if (!st.allFinite()) return Vector4f::Zero();
   if (!is_resolved(footprint)) return state_->mean(st);

@@ -35,8 +35,7 @@ class Texture {
   Texture(Image image, Wrap wrap);
 
   /// Reads a file in any format that OpenImageIO supports: integers of 8 or 16 bits, floats; grey, grey with alpha,
-  /// RGB, RGBA, CMYK (converted by OpenImageIO's reader). The picture is the display window of the file; it is
-  /// transparent black outside the data window.
+  /// RGB, RGBA, CMYK (converted by OpenImageIO's reader). The picture is the display window of the file.
   /// @param color_space  Colour space of the file: a name, alias or role of the OCIO config; empty: see
   ///                     `ColorManagement::picture_conversion`. Alpha is not converted.
   /// @param layer        Layer of the file, as of read_native_image.

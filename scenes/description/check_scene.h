@@ -2,7 +2,7 @@
 /// @file scenes/description/check_scene.h
 /// Checks rules between several values of a scene file. The limits of each single value are checked by the reader.
 
-#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
 #include "scenes/description/description.h"
 
 namespace tensorray {
@@ -25,8 +25,7 @@ void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* poin
                   const SceneSource& source);
 
 /// @throw SceneError if `bytes`, and what the program takes, are more than this process may have (memory_limit).
-/// Estimates are within a third of what large pictures were measured to take
-/// (Limits.EstimatesOfMemoryAreNearWhatIsMeasured).
+/// Estimates are within a third of what large pictures take.
 /// @param what  The keys that need the memory, for the message.
 void check_memory(double bytes, const std::string& what, const SceneSource& source);
 

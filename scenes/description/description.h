@@ -56,16 +56,8 @@ struct MaterialDescription {
   double index = 1.5;                                  ///< glass: index of refraction.
 };
 
-inline Choices<MaterialKind> choices(MaterialKind) {
-  return {{"diffuse", MaterialKind::diffuse},
-          {"principled", MaterialKind::principled},
-          {"metal", MaterialKind::metal},
-          {"glass", MaterialKind::glass}};
-}
-
-inline Choices<Metal> choices(Metal) {
-  return {{"gold", Metal::gold}, {"silver", Metal::silver}, {"copper", Metal::copper}, {"aluminium", Metal::aluminium}};
-}
+inline Words words(MaterialKind) { return {"diffuse", "principled", "metal", "glass"}; }
+inline Words words(Metal) { return {"gold", "silver", "copper", "aluminium"}; }
 
 inline void describe(MaterialDescription& material, KeyVisitor& visit) {
   visit("kind", material.kind, "kind of material");

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
 #include "scenes/keys/key_visitor.h"
 
 namespace tensorray {

@@ -19,8 +19,7 @@
 #include "scenes/description/check_scene.h"
 #include "scenes/keys/values.h"
 
-// The file: the mark; an archive of the header, as JSON, and of the name and the size of each result; the results; the
-// hash of all this.
+// The file: the mark; an archive of the header, as JSON, and the name and size of each result; these; the hash of all.
 
 namespace tensorray {
 namespace {
@@ -87,8 +86,7 @@ Json files_of(const SceneDescription& description, bool hashes_all) {
 
 std::string shown(const Json& value) { return value.is_null() ? "not given" : excerpt(value); }
 
-/// The pointer of the first value that differs, and both values; values of the same place are alike whatever the order
-/// of their keys.
+/// The pointer of the first value that differs, and both values, whatever the order of keys.
 std::string scene_difference(const Json& there, const Json& here, const std::string& pointer) {
   if (there.is_object() && here.is_object()) {
     std::set<std::string> keys;

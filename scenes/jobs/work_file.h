@@ -28,8 +28,7 @@ WorkFile read_work(const std::filesystem::path& path);
 
 /// The shards of a render, put together: their part has the number of shards.
 /// @param files  In any order.
-/// @throw std::invalid_argument naming shards that are missing, repeated, incomplete or of another render; as
-/// read_work.
+/// @throw std::invalid_argument naming shards that are missing, repeated, incomplete or of another render.
 WorkFile read_shards(const std::vector<std::string>& files);
 
 /// The version of the program; the method; the scene with its changes, but without its output files; the scale and the
@@ -43,8 +42,7 @@ Json origin_of(const Scene& scene, bool hashes_all = true);
 bool is_origin(const Json& json);
 
 /// The first difference between two origins, as "`/camera/resolution` is [800,800] there, [400,400] here"; empty if
-/// there is none. Files are compared by their hashes where both have one. @param there  Of a file. @param here  Of the
-/// scene that is loaded.
+/// there is none. Files are compared by hashes where both have one. @param here  Of the loaded scene.
 std::string difference(const Json& there, const Json& here);
 
 /// Sets what a scene leaves open to what the origin has. The scene must be that of the origin.

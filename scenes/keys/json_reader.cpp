@@ -42,18 +42,16 @@ class StrictRules {
  public:
   bool operator()(int depth, Json::parse_event_t event, Json& parsed) {
     using Event = Json::parse_event_t;
-    if (event == Event::object_start || event == Event::array_start) {
+    if (event == Event::object_start || event == Event::array_start)
       if (depth >= nesting_limit) throw SceneError(fmt::format("is nested deeper than {} levels", nesting_limit));
-    }
     if (event == Event::object_start) {
       keys_.emplace_back();
     } else if (event == Event::object_end) {
       keys_.pop_back();
     } else if (event == Event::key) {
       const auto& key = parsed.get_ref<const std::string&>();
-      if (!keys_.back().insert(key).second) {
+      if (!keys_.back().insert(key).second)
         throw SceneError(fmt::format("key `{}` is given twice in the same object; remove one", key));
-      }
     }
     return true;
   }

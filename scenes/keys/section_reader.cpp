@@ -8,8 +8,6 @@
 
 #include <fmt/core.h>
 
-#include "scenes/keys/key_visitor.h"
-
 namespace tensorray {
 namespace {
 
@@ -53,6 +51,25 @@ std::string suggestion(const std::string& key, const std::set<std::string>& know
   return "known keys are " + quoted_list({known.begin(), known.end()}, ", ");
 }
 
+/// Voxels along each axis of `extent`: `longest` along the longest axis, and voxels as close to cubes as possible.
+Eigen::Vector3i cubic_resolution(const Eigen::Vector3d& extent, int longest) {
+  const double length = extent.maxCoeff();
+  if (longest == 1 || !(length > 0)) return Eigen::Vector3i::Ones();
+  return ((extent / length * (longest - 1)).array().round() + 1).cast<int>();
+}
+
+void check(const GridSettings& grid) {
+  if ((grid.max - grid.min).minCoeff() < 0) throw std::invalid_argument("`max` must not be below `min` on any axis");
+  if (!(grid.max - grid.min).allFinite()) throw std::invalid_argument("`min` and `max` are too far apart");
+  const Eigen::Vector3i& n = grid.resolution;
+  if (n.minCoeff() < 1) throw std::invalid_argument("`resolution` must be at least 1 on every axis");
+  if (((grid.max - grid.min).array() == 0 && n.array() > 1).any())
+    throw std::invalid_argument("`resolution` must be 1 on an axis where `min` and `max` are equal");
+  if (n.cast<double>().prod() > voxel_limit)
+    throw std::invalid_argument(
+        fmt::format("`resolution` asks for {} x {} x {} voxels, more than 2^31; ask for fewer", n.x(), n.y(), n.z()));
+}
+
 }  // namespace
 
 SectionReader::SectionReader(const Json& object, std::string pointer, const SceneSource& source)
@@ -67,13 +84,12 @@ const Json* SectionReader::find(const char* key) {
 std::string SectionReader::pointer_to(const std::string& key) const {
   std::string pointer = pointer_ + "/";
   for (const char c : key) {  // Escapes of RFC 6901.
-    if (c == '~') {
+    if (c == '~')
       pointer += "~0";
-    } else if (c == '/') {
+    else if (c == '/')
       pointer += "~1";
-    } else {
+    else
       pointer += c;
-    }
   }
   return pointer;
 }
@@ -185,6 +201,96 @@ void SectionReader::finish() const {
     source_.fail(fmt::format("`{}` and `{}` exclude each other; remove one", pointer_to(exclusion.key),
                              pointer_to(exclusion.other)));
   }
+}
+
+void SchemaWriter::value(const char* key, KeyMember& member, const char* meaning, const Limits& limits) {
+  Json schema = {{"description", meaning}};
+  const Json value = member.schema(limits);
+  if (limits.word)
+    schema["anyOf"] = {value, {{"const", limits.word}}};
+  else
+    schema.update(value);
+  const Json standard = limits.word && member.is_word() ? Json(limits.word) : member.json();
+  const bool is_required = std::find(required_.begin(), required_.end(), key) != required_.end();
+  if (!standard.is_null() && !is_required) schema["default"] = standard;
+  if (!limits.examples.empty()) schema["examples"] = limits.examples;
+  if (limits.is_knob) schema["knob"] = limits.from < limits.to ? Json{limits.from, limits.to} : Json(true);
+  properties_[key] = schema;
+}
+
+void SchemaWriter::object(const char* key, const char* meaning, const Describe& describe_keys) {
+  SchemaWriter inner;
+  describe_keys(inner);
+  properties_[key] = inner.finish(meaning);
+}
+
+void SchemaWriter::objects(const char* key, const char* meaning, const Describe& describe_next) {
+  SchemaWriter inner;
+  describe_next(inner);
+  properties_[key] = {{"description", meaning}, {"type", "array"}, {"items", inner.finish("")}};
+}
+
+void SchemaWriter::only_where(std::initializer_list<const char*> keys, const char* chooser, const std::string& word,
+                              const std::vector<std::string>& words) {
+  Json chosen = {{"properties", {{chooser, {{"enum", words}}}}}};
+  const bool is_default = std::find(words.begin(), words.end(), word) != words.end();
+  if (!is_default) chosen["required"] = {chooser};
+  for (const char* key : keys) rules_.push_back({{"anyOf", {chosen, {{"not", {{"required", {key}}}}}}}});
+}
+
+void SchemaWriter::generator(const char* key, std::optional<GenerateDescription>& /*member*/, const char* meaning) {
+  Json kinds = Json::array();
+  for (const std::string& kind : generator_kinds()) {
+    SchemaWriter inner;
+    inner.require({"kind"});
+    inner.properties_["kind"] = {{"description", "kind of field"}, {"const", kind}};
+    GridRequest grid;
+    describe(grid, inner);
+    Generator parameters = generator_of(kind);
+    std::visit([&inner](auto& alternative) { describe(alternative, inner); }, parameters);
+    kinds.push_back(inner.finish(""));
+  }
+  properties_[key] = {{"description", meaning}, {"oneOf", kinds}};
+}
+
+void SchemaWriter::require(std::initializer_list<const char*> keys) {
+  required_.insert(required_.end(), keys.begin(), keys.end());
+}
+
+void SchemaWriter::exactly_one(std::initializer_list<const char*> keys) {
+  for (const char* key : keys) alternatives_.push_back({{"required", {key}}});
+}
+
+void SchemaWriter::exclude(const char* key, std::initializer_list<const char*> others) {
+  for (const char* other : others) rules_.push_back({{"not", {{"required", {key, other}}}}});
+}
+
+Json SchemaWriter::finish(const std::string& meaning) const {
+  Json schema;
+  if (!meaning.empty()) schema["description"] = meaning;
+  schema["type"] = "object";
+  schema["properties"] = properties_;
+  schema["additionalProperties"] = false;
+  if (!required_.empty()) schema["required"] = required_;
+  if (!alternatives_.empty()) schema["oneOf"] = alternatives_;
+  if (!rules_.empty()) schema["allOf"] = rules_;
+  return schema;
+}
+
+GridSettings choose_grid(const Generator& generator, const GridRequest& request) {
+  const auto* each = std::get_if<Eigen::Vector3i>(&request.resolution);
+  const int longest = each ? each->maxCoeff() : std::get<int>(request.resolution);
+  if (longest < 1) throw std::invalid_argument("`resolution` must be at least 1");
+
+  GridSettings grid = default_grid(generator, std::max(longest, 2));  // With one voxel the box would have no extent.
+  if (request.min) grid.min = *request.min;
+  if (request.max) grid.max = *request.max;
+  if (each)
+    grid.resolution = *each;
+  else if (request.min || request.max || longest == 1)
+    grid.resolution = cubic_resolution(grid.max - grid.min, longest);
+  check(grid);
+  return grid;
 }
 
 }  // namespace tensorray

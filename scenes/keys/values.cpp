@@ -1,9 +1,7 @@
 #include "scenes/keys/values.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 #include "base/text/path_text.h"
 

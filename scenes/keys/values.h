@@ -3,7 +3,6 @@
 /// How values of each type are written in a scene file: one trait for each type.
 
 #include <algorithm>
-#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -88,16 +87,23 @@ inline Limits endings(std::vector<std::string> allowed) {
   return limits;
 }
 
-/// Names in scene files for the values of an enumeration. `choices(Enum{})` returns all values and their names; its
-/// argument only selects the overload.
+/// Names in scene files for the values of an enumeration, in its order. `words(Enum{})` returns them.
+using Words = std::vector<const char*>;
+
+/// The same as pairs. An enumeration whose names are listed in another order has `choices(Enum{})` instead of `words`.
 template <class Enum>
 struct Choice {
   const char* name;
   Enum value;
 };
-
 template <class Enum>
 using Choices = std::vector<Choice<Enum>>;
+template <class Enum>
+Choices<Enum> choices(Enum) {
+  Choices<Enum> all;
+  for (const char* word : words(Enum{})) all.push_back({word, static_cast<Enum>(all.size())});
+  return all;
+}
 
 /// The name of a value.
 template <class Enum>
@@ -179,9 +185,8 @@ struct Value<Eigen::Matrix<Scalar, size, 1>> {
       return true;
     }
     if (!json.is_array() || json.size() != size) return false;
-    for (int i = 0; i < size; ++i) {
+    for (int i = 0; i < size; ++i)
       if (!Value<Scalar>::read(json[static_cast<std::size_t>(i)], each, target[i])) return false;
-    }
     // The square must neither vanish nor overflow, because the vector will be normalised.
     const double square = target.template cast<double>().squaredNorm();
     return !limits.not_zero || (std::isnormal(square) && square > 0);

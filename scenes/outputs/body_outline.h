@@ -12,8 +12,7 @@
 
 namespace tensorray {
 
-/// The lines as a plate shows them along `direction` (not across its normal). What lies behind a body, as seen from the
-/// side of the plate's normal, is hidden.
+/// The lines as a plate shows them along `direction` (not across its normal). What lies behind a body is hidden.
 std::vector<OutlineStroke> body_outline(const std::vector<TriangleMesh>& bodies, const Plate& plate,
                                         const Eigen::Vector3d& direction);
 

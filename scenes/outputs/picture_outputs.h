@@ -3,7 +3,6 @@
 /// The pictures that every method can write, and the header entries of all files.
 
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "renderer/camera/camera.h"
@@ -41,15 +40,13 @@ PictureView picture_view(const Plate& plate);
 /// The view of a picture of a camera.
 PictureView picture_view(const Camera& camera);
 
-/// A legend of the light of a scene, for Render::draw_legend: its wavelengths (in RGB mode, its flexibilities) and the
-/// exposure.
+/// A legend of a scene's light, for Render::draw_legend: wavelengths (RGB mode: flexibilities) and exposure.
 std::function<void(Image&, double exposure)> light_legend(const Scene& scene);
 
 /// Draws the caption, the scale bar and the axes that `output` asks for, if the picture has them.
 void draw_annotations(const OutputDescription& output, const Render& render, Image& image);
 
-/// The colour of light of one wavelength (nm) for the eye, linear Rec. 709, as saturated as a display can show it; grey
-/// if the eye does not see it.
+/// The colour of a wavelength (nm), linear Rec. 709, as saturated as a display can show it; grey if the eye sees none.
 Eigen::Vector3d wavelength_color(double wavelength);
 
 }  // namespace tensorray

@@ -32,8 +32,7 @@ void commit_outputs(OutputFiles files);
 /// starts, the rest where it ends, and both balance: emitted = deposited + missed + side + stopped; `side` is there if
 /// `integrator.side_light` leaves light out. `channels` has the counts of each wavelength. Of the method "scene",
 /// `photons` has the photons of its lights by their end, also for each pass: emitted = before + landed + escaped +
-/// stopped; `bent_rays` are those that are followed back, and `samples` those of the picture. `scene` is the path as
-/// UTF-8 (path_text.h).
+/// stopped; `bent_rays` are those that are followed back, and `samples` those of the picture. `scene` is the path.
 std::string statistics_json(const Scene& scene, const Statistics& statistics, double seconds_writing, int threads);
 
 }  // namespace tensorray

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -9,7 +8,7 @@
 #include <sys/stat.h>
 
 #include "base/process/seconds.h"
-#include "base/text/numbered_name.h"
+#include "base/text/path_text.h"
 #include "renderer/meshes/mesh.h"
 #include "scenes/description/choices.h"
 #include "scenes/scene/scene.h"

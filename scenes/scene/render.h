@@ -17,7 +17,7 @@
 #include "renderer/film/film.h"
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
-#include "renderer/light_maps/photon_counts.h"
+#include "renderer/light_maps/photon_map.h"
 #include "tracing/bending/bending.h"
 #include "tracing/paths/paths.h"
 #include "volumes/grids/tensor_grid.h"
@@ -39,8 +39,7 @@ struct Statistics {
   std::vector<EndCounts> ends;         ///< ... and by channel and end, counted there.
   /// Power of one ray of each channel, for a beam of irradiance 1; empty if rays carry no power.
   std::vector<double> channel_power;
-  /// Power by channel and end, for a beam of irradiance 1; if rays of a channel differ in power. Empty otherwise. And
-  /// that of the whole beam.
+  /// Power by channel and end, for a beam of irradiance 1, if rays of a channel differ in power; and the whole beam's.
   std::vector<std::array<double, ray_end_count>> power;
   double beam_power = 0;
   std::optional<SceneMethodStatistics> scene_method;  ///< Its `ends` are those of all rays that bend.

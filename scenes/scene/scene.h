@@ -114,8 +114,7 @@ DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, 
 void require_near(const Plate& plate, const char* pointer, const SceneDescription& description,
                   const TensorField& field);
 
-/// Whether the light of the scene has a white that pictures can be adapted to. Nearly monochromatic light has none:
-/// pictures show its colour.
+/// Whether the light of the scene has a white that pictures can be adapted to. Nearly monochromatic light has none.
 bool has_white(const Scene& scene);
 
 /// Matrix from XYZ to the working space. The white of the light becomes neutral if the scene asks for white balance.

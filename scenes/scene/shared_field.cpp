@@ -1,15 +1,13 @@
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 #include <sys/stat.h>
 
-#include "base/files/shared_file.h"
+#include "base/files/temporary_folder.h"
 #include "base/process/archive.h"
 #include "base/text/content_hash.h"
 #include "scenes/scene/scene.h"

@@ -17,7 +17,6 @@
 #include "renderer/color/chromaticities.h"
 #include "renderer/color/color.h"
 #include "renderer/color/file_colors.h"
-#include "renderer/color/icc_profile.h"
 #include "renderer/textures/texture.h"
 #include "tests/images/picture_files.h"
 #include "tests/renderer/support.h"

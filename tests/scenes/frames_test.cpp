@@ -1,9 +1,9 @@
 // Tests keyframes, and numbers of frames in file names.
 
-#include "scenes/source/frames.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "scenes/source/overrides.h"
 
 namespace tensorray {
 namespace {

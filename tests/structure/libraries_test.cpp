@@ -43,7 +43,7 @@ TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
       {"OpenEXR", {"renderer/images/exr.cpp"}},
       {"png", {"renderer/images/png.cpp"}},
       {"assimp", {"renderer/meshes/assimp_mesh.cpp"}},
-      {"lcms2", {"renderer/color/icc_profile.cpp"}},
+      {"lcms2", {"renderer/color/file_colors.cpp"}},
       {"boost",
        {"tools/viewer/server/http_connection.cpp", "tools/viewer/server/page_socket.cpp",
         "tools/viewer/server/server_state.h"}}};

@@ -1,9 +1,8 @@
 // A scene whose keys change: its pictures are those of a scene that is loaded anew, bit for bit.
 
-#include "tools/viewer/live_scene.h"
-
 #include "scenes/outputs/picture_outputs.h"
 #include "tests/viewer/view_support.h"
+#include "tools/viewer/stages.h"
 
 namespace tensorray {
 namespace {

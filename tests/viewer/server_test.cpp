@@ -14,7 +14,6 @@
 #include <boost/beast/websocket.hpp>
 
 #include "tests/viewer/view_support.h"
-#include "tools/viewer/server/token.h"
 
 namespace tensorray {
 namespace {

@@ -50,10 +50,7 @@ int main(int argc, char** argv) {
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   benchmark::AddCustomContext("processor", processor());
   add_rays();
-  add_pictures();
-  add_caustics();
-  add_interpolation();
-  add_loading();
+  add_renders();
   add_view();
   RatioReporter reporter;
   benchmark::RunSpecifiedBenchmarks(&reporter);

@@ -1,6 +1,6 @@
 /// @file tools/benchmark/rays.cpp
-/// Rays a second of one thread: a loop that a user of OpenVDB's BoxSampler would write, `trace` with the same step on
-/// the same linear field, and `trace` with the defaults (cubic fields, steps of order four).
+/// Rays a second of one thread: a loop that a user of OpenVDB's BoxSampler would write, and `trace`, which
+/// has cubic fields and steps of order four.
 
 #include <array>
 #include <map>
@@ -19,7 +19,7 @@
 namespace tensorray::bench {
 namespace {
 
-constexpr double step = 0.5;                                     // Of the first two ways, voxels.
+constexpr double step = 0.5;                                     // Of the loop, voxels.
 constexpr int resolution = 128, wavelengths = 32, origins = 32;  // Origins along an edge of a square.
 
 /// A field, and the square across its face from which light starts: packets of all wavelengths from each origin.
@@ -166,9 +166,6 @@ class OpenVdbLoop {
 }  // namespace
 
 void add_rays() {
-  BendingSettings same_step;
-  same_step.method = BendingMethod::splitting;
-  same_step.step = step;
   for (const Case& test : cases()) {
     const std::string name = std::string("rays/") + test.name;
     const auto add = [&](const char* way, const auto& run) {
@@ -177,10 +174,6 @@ void add_rays() {
     add("openvdb", [&test](benchmark::State& state) {
       const Rays& rays = rays_of(test);
       measure(state, rays, OpenVdbLoop(rays));
-    });
-    add("linear", [&test, same_step](benchmark::State& state) {
-      const Rays& rays = rays_of(test);
-      measure(state, rays, [&](RayBatch& batch) { trace(rays.linear, rays.geometry, same_step, batch); });
     });
     add("default", [&test](benchmark::State& state) {
       const Rays& rays = rays_of(test);

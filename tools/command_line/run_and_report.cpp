@@ -1,12 +1,10 @@
 #include "tools/command_line/run_and_report.h"
 
+#include <atomic>
 #include <csignal>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <new>
-#include <stdexcept>
-#include <string>
 #include <system_error>
 
 #include <CLI/Error.hpp>
@@ -14,7 +12,6 @@
 
 #include "base/process/child_program.h"
 #include "base/process/process_limits.h"
-#include "base/process/progress.h"
 #include "base/text/text.h"
 #include "tools/command_line/tell.h"
 
@@ -57,6 +54,17 @@ void expect_exceptions() { std::set_terminate(end_by_exception); }
 /// its exception comes before `main`.
 __attribute__((section(".preinit_array"), used)) void (*const before_libraries)() = expect_exceptions;
 #endif
+
+// Global, because a signal handler can reach nothing else.
+Progress progress;
+std::atomic<bool> picture_request{false};
+
+void on_interrupt(int) {
+  progress.cancelled = true;
+  std::signal(SIGINT, SIG_DFL);
+}
+
+void on_picture_request(int) { picture_request = true; }
 
 }  // namespace
 
@@ -104,5 +112,18 @@ int answer_parent(const std::function<void()>& work) {
   }
   return failed;
 }
+
+Progress& progress_until_interrupted() {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  struct sigaction hangup {};  // nohup has it ignored.
+  if (sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler != SIG_IGN) std::signal(SIGHUP, on_interrupt);
+  std::signal(SIGUSR1, on_picture_request);
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+  return progress;
+}
+
+bool take_picture_request() { return picture_request.exchange(false); }
 
 }  // namespace tensorray

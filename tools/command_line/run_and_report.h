@@ -1,11 +1,13 @@
 #pragma once
 /// @file tools/command_line/run_and_report.h
-/// Reports errors to the user: one line, and an exit status.
+/// How the programs end: errors as one line and an exit status, and signals.
 
 #include <exception>
 #include <functional>
 #include <stdexcept>
 #include <string>
+
+#include "base/process/progress.h"
 
 namespace tensorray {
 
@@ -24,5 +26,13 @@ int run_and_report(const std::function<void()>& work);
 /// The same for the program that started this one with run_program (base/process/child_program.h): ends with it, takes
 /// no more memory than there is, and prints an error without the program's name.
 int answer_parent(const std::function<void()>& work);
+
+/// Makes SIGINT (Ctrl-C) and SIGTERM cancel the returned progress, which lives as long as the program. A second
+/// signal ends the program at once. Broken pipes and file-size limits become errors of the write that meets them.
+Progress& progress_until_interrupted();
+
+/// Whether SIGUSR1, which asks for a picture of what there is so far, has come since the last call. It does nothing
+/// else.
+bool take_picture_request();
 
 }  // namespace tensorray

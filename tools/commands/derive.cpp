@@ -8,7 +8,6 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "base/files/distinct_files.h"
 #include "base/files/output_file.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"

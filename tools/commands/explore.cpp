@@ -19,7 +19,6 @@
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
-#include "tools/command_line/progress_bar.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/commands/commands.h"

@@ -14,6 +14,7 @@
 
 #include "base/text/path_text.h"
 #include "base/text/text.h"
+#include "integrators/methods/read_scene.h"
 #include "tools/command_line/threads.h"
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
@@ -240,6 +241,11 @@ void add_info_command(CLI::App& program) {
     std::signal(SIGTERM, SIG_DFL);
     info(*options);
   });
+}
+
+void add_schema_command(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("schema", "Print the JSON Schema of scene files");
+  command->callback([] { fmt::print("{}\n", scene_schema(SchemaKind::with_keyframes)); });
 }
 
 }  // namespace tensorray

@@ -5,7 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
 #include "scenes/jobs/work_file.h"
 #include "tools/commands/commands.h"
 #include "tools/rendering/render_scene.h"

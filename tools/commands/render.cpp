@@ -7,10 +7,10 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
-#include "scenes/source/frames.h"
+#include "scenes/source/overrides.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
 #include "tools/ranks/ranks.h"

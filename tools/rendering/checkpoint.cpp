@@ -14,10 +14,9 @@
 #include "base/process/seconds.h"
 #include "base/text/path_text.h"
 #include "base/text/text.h"
-#include "scenes/jobs/work_file.h"
-#include "tools/command_line/interrupts.h"
+#include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
-#include "tools/rendering/run_outputs.h"
+#include "tools/rendering/render_scene.h"
 
 namespace tensorray {
 namespace {

@@ -34,8 +34,7 @@ void set_aside(const std::filesystem::path& checkpoint, const std::string& why, 
 EarlierResults read_earlier(const std::filesystem::path& checkpoint, const RenderRun& run, const Scene& scene);
 
 /// While it lives, a thread writes the work of a render to a checkpoint, and asks the work for pictures, after each
-/// interval and when SIGUSR1 comes. Where a checkpoint cannot be written, it says so once; the render goes on, and the
-/// last checkpoint stays.
+/// interval and when SIGUSR1 comes. Where none can be written, it says so once, and the last stays.
 class Checkpoint {
  public:
   /// @param file  Empty: none is written. The other arguments must outlive it.

@@ -7,13 +7,11 @@
 
 #include <fmt/format.h>
 
-#include "base/text/text.h"
 #include "scenes/jobs/work_file.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/rendering/render_scene.h"
-#include "tools/rendering/run_outputs.h"
 
 namespace tensorray {
 namespace {
@@ -63,8 +61,7 @@ class Sequence {
   }
 
   /// What the frames have in common: the scale and the direction, where scenes leave them open. They are those of the
-  /// first frame; where the run keeps going, of the first one that can be loaded, or nothing if none can: each then
-  /// fails when its turn comes.
+  /// first frame; where the run keeps going, of the first one that can be loaded, if any.
   Json common_values(const std::vector<int>& frames) {
     for (const int frame : frames) {
       try {

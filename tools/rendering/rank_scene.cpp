@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "base/text/path_text.h"
-#include "base/text/text.h"
 #include "scenes/jobs/work_file.h"
 #include "scenes/scene/render.h"
 

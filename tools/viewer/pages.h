@@ -20,7 +20,6 @@
 #include "base/process/progress.h"
 #include "scenes/keys/json_reader.h"
 #include "tools/viewer/answers.h"
-#include "tools/viewer/live_scene.h"
 #include "tools/viewer/stages.h"
 
 namespace tensorray {

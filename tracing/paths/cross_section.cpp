@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
-#include "base/geometry/turn.h"
+#include "base/geometry/box.h"
 #include "renderer/surfaces/plate.h"
 
 namespace tensorray {

@@ -2,6 +2,7 @@
 /// @file volumes/bricks/tensor_field.h
 /// A tensor field that light can be traced through: immutable bricks in memory, and what is between their voxels.
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -65,6 +66,14 @@ struct TensorBrick {
   int components;         ///< `general` or `symmetric`; the same in all bricks of a field.
 
   Eigen::Matrix3d tensor(int voxel) const;  ///< The tensor T at a voxel of a linear field.
+};
+
+/// The brick of the finest level at a point, whose cells are smaller than those of level 0 by `scale`.
+struct LeafBrick {
+  TensorBrick brick;
+  std::array<float, 3>
+      first{};      ///< Its first voxel, from that of the brick of level 0 that it is in, voxels of level 0.
+  float scale = 1;  ///< 2 to the power of its level: its voxels along an edge of a voxel of level 0.
 };
 
 /// What a field consists of.
@@ -150,6 +159,14 @@ class TensorField {
     const BrickIndex::Entry entry = index_.entry(brick);
     return brick_at(entry.number == BrickIndex::missing ? zeros : memory_.brick(entry.number), entry.value);
   }
+
+  /// Number of levels; 1 if all voxels have one size.
+  int levels() const { return 1; }
+
+  /// The brick of the finest level that holds a point. It may be the brick of zeros.
+  /// @param at  The brick of level 0. @param position  From its first voxel, in voxels of level 0; what is outside of
+  /// the brick is taken as on its faces.
+  LeafBrick leaf(const Eigen::Vector3i& at, const std::array<float, 3>& /*position*/) const { return {brick(at)}; }
 
   /// Whether the brick is in memory. If not, `brick` returns the brick of zeros.
   bool is_stored(const Eigen::Vector3i& brick) const { return index_.find(brick) != BrickIndex::missing; }

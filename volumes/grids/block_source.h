@@ -12,6 +12,12 @@
 
 namespace tensorray {
 
+/// The blocks of a level.
+struct BlockLevel {
+  std::vector<BlockShape> shapes;  ///< Each has at least one active voxel; ordered by origin (x, y, z).
+  std::function<void(std::size_t i, TensorBlock& block)> fill;  ///< As BlockSource::fill.
+};
+
 /// A sparse grid of tensors whose blocks are made when they are needed. Name, transform, metadata and surface are
 /// those of a TensorGrid.
 struct BlockSource {
@@ -24,6 +30,8 @@ struct BlockSource {
   /// Writes the values of the active voxels of block i to `block`, whose shape is set and whose other voxels are zero.
   /// Any thread may call it, any number of times. @throw std::runtime_error that names the file.
   std::function<void(std::size_t i, TensorBlock& block)> fill;
+
+  std::vector<BlockLevel> finer = {};  ///< TensorGrid::finer.
 };
 
 /// Empties `block`, and fills it with block i of `source`.

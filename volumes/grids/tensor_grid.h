@@ -64,6 +64,11 @@ struct TensorGrid {
   std::map<std::string, std::string> metadata;  ///< `tensorray:field`, `tensorray:units`, `tensorray:source`, ...
   TriangleMesh surface;  ///< Of the body that the field is in, closed, outwards, world; empty: none.
 
+  /// The voxels of finer levels, where there are any: voxel (i, j, k) of level l, which is finer[l − 1], has its centre
+  /// at `to_world` * (i, j, k) / 2^l. The field is refined in the bricks of 8³ cells of the level before in which a
+  /// voxel of the level is active.
+  std::vector<TensorBlocks> finer = {};
+
   std::vector<BlockShape> shapes() const;  ///< Of all blocks, in their order.
   std::size_t active_voxels() const { return tensorray::active_voxels(shapes()); }
   Eigen::AlignedBox3i active_box() const { return tensorray::active_box(shapes()); }

@@ -20,7 +20,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
-#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
 #include "base/text/byte_order.h"
 #include "base/text/content_hash.h"
 #include "base/text/text.h"

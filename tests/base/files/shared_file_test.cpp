@@ -1,7 +1,5 @@
 // Files that processes of a machine have in common, with processes that end at each step.
 
-#include "base/files/shared_file.h"
-
 #include <csignal>
 #include <cstdlib>
 #include <fstream>

@@ -1,5 +1,3 @@
-#include "base/geometry/ply_writer.h"
-
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -8,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/geometry/triangle_mesh.h"
 #include "base/text/byte_order.h"
 
 namespace tensorray {

@@ -1,8 +1,8 @@
-#include "base/geometry/turn.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
+
+#include "base/geometry/box.h"
 
 namespace tensorray {
 namespace {

@@ -1,5 +1,3 @@
-#include "renderer/charts/grid_lines.h"
-
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -7,6 +5,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "renderer/charts/ink.h"
 
 namespace tensorray {
 namespace {

@@ -1,6 +1,6 @@
-#include "renderer/light_maps/irradiance_map.h"
-
 #include <gtest/gtest.h>
+
+#include "renderer/light_maps/photon_map.h"
 
 namespace tensorray {
 namespace {

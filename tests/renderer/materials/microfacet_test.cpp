@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
-#include "renderer/materials/rough_conductor.h"
+#include "renderer/materials/metal_and_glass.h"
 #include "renderer/sampling/random.h"
 
 namespace tensorray {

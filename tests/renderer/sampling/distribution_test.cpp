@@ -1,11 +1,10 @@
-#include "renderer/sampling/distribution.h"
-
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
 #include "renderer/sampling/random.h"
+#include "renderer/sampling/sampling.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {

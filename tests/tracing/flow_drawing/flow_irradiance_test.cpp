@@ -12,7 +12,7 @@
 
 #include "base/process/job.h"
 #include "base/process/progress.h"
-#include "renderer/light_maps/irradiance_map.h"
+#include "renderer/light_maps/photon_map.h"
 #include "tests/base/rank_support.h"
 #include "tests/tracing/support.h"
 

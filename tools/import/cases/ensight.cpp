@@ -21,7 +21,6 @@
 
 #include "base/errors.h"
 #include "base/files/temporary_folder.h"
-#include "base/text/short_lines.h"
 #include "base/text/text.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk_formats/array_names.h"

@@ -20,14 +20,11 @@
 #include <unistd.h>
 
 #include "base/files/descriptor.h"
-#include "base/files/distinct_files.h"
 #include "base/files/output_file.h"
 #include "base/files/temporary_folder.h"
 #include "base/process/progress.h"
-#include "base/text/numbered_name.h"
+#include "base/text/path_text.h"
 #include "base/text/text.h"
-#include "tools/command_line/interrupts.h"
-#include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "base/constants.h"
-#include "base/geometry/ply_writer.h"
 #include "base/geometry/triangle_mesh.h"
 #include "tools/import/surfaces/face_triangles.h"
 

@@ -23,7 +23,6 @@
 
 #include "base/errors.h"
 #include "base/files/temporary_folder.h"
-#include "base/text/short_lines.h"
 #include "base/text/text.h"
 #include "tools/import/cases/ensight.h"
 #include "tools/import/cases/exodus.h"

@@ -13,14 +13,11 @@
 
 #include "base/process/child_program.h"
 #include "renderer/images/image.h"
-#include "tools/command_line/interrupts.h"
-#include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/viewer/pages.h"
 #include "tools/viewer/server/server.h"
-#include "tools/viewer/server/token.h"
 
 namespace {
 

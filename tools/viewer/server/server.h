@@ -26,9 +26,8 @@ struct ServerSettings {
 };
 
 /// Answers only requests whose path begins with the token, whose `Host` is one of the server's, and, for a WebSocket,
-/// whose `Origin` is one, too: another site that a browser shows must not reach the server, also not by a name that it
-/// made to mean this machine (DNS rebinding). Sizes of messages, the numbers of connections and pages, what waits to be
-/// sent, and the time that a client may take are bounded.
+/// whose `Origin` is one, too: no other site may reach the server, nor by DNS rebinding. Messages, connections, pages,
+/// what waits to be sent, and the time of a client are bounded.
 class Server {
  public:
   struct State;
@@ -50,5 +49,14 @@ class Server {
  private:
   std::shared_ptr<State> state_;
 };
+
+// The secret in the address of a live view.
+
+/// 128 random bits, as hexadecimal digits.
+std::string random_token();
+
+/// The token of this user, which stays the same, so that pages find a server that was started again. It is kept in
+/// $XDG_STATE_HOME/tensorray or ~/.local/state/tensorray, in a file that only the user may read. Else it is new.
+std::string token_of_user();
 
 }  // namespace tensorray

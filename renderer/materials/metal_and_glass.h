@@ -1,6 +1,6 @@
 #pragma once
-/// @file renderer/materials/rough_conductor.h
-/// Metals with a complex index of refraction and a rough surface.
+/// @file renderer/materials/metal_and_glass.h
+/// Rough surfaces of metals, with a complex index of refraction, and of glass and similar materials.
 
 #include <string>
 #include <vector>
@@ -42,13 +42,39 @@ ConductorScattering prepare(const RoughConductor& settings);
 
 /// Sets f for wi and wo with z > 0, in as many bands as it has.
 /// @param reflectance  A factor of Fresnel's reflectance at every bounce.
-/// @return the density of `sample`. Directions below the surface, which it may give, have density 0, so the integral of
-/// the density is below 1.
+/// @return the density of `sample`; 0 below the surface, where it may give directions: its integral is below 1.
 double evaluate(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,
                 const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
 
 /// Samples a direction wi. It may be below the surface, where nothing is reflected.
 /// @param u  In [0, 1)².
 Eigen::Vector3d sample(const ConductorScattering& metal, const Eigen::Vector3d& wo, const Eigen::Vector2d& u);
+
+struct RoughDielectric {
+  double roughness = 0.1;  ///< 0 to 1; values below min_roughness count as min_roughness.
+  double index = 1.5;      ///< Index of the inside (z < 0) relative to the outside: 0.2 to 5, at least 0.01 from 1.
+};
+
+/// A prepared glass (Walter et al. 2007), for both sides. Radiance obeys the n² law: f(wi, wo) / n(wo)² = f(wo, wi) /
+/// n(wi)². No uniform light (radiance in proportion to n²) is lost, to 2e-3 (1e-2 near the horizon if the index is
+/// within 0.1 of 1): reciprocal lobes, reflected and refracted, return what single bounces lose.
+struct DielectricScattering {
+  double alpha = 1;
+  double index = 1.5;
+  CosineTable missing_outside;  ///< Fraction of light from this side that single bounces (reflected or refracted) lose.
+  CosineTable missing_inside;
+  double refracted = 0;  ///< Strength of the refracting lobes; see prepare() in the source.
+};
+
+/// @throw std::invalid_argument if a setting is out of range.
+DielectricScattering prepare(const RoughDielectric& settings);
+
+/// Arguments are as for conductors, but wi and wo may have any z except 0.
+/// @param reflectance  A factor of all scattered light.
+double evaluate(const DielectricScattering& glass, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f);
+/// @param u  In [0, 1)³; z chooses between reflection and refraction.
+/// May give a zero vector, or a direction for which `evaluate` gives 0: this light is lost between the facets.
+Eigen::Vector3d sample(const DielectricScattering& glass, const Eigen::Vector3d& wo, const Eigen::Vector3d& u);
 
 }  // namespace tensorray
