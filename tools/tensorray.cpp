@@ -15,6 +15,7 @@
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
+#include "tools/command_line/imported_field.h"
 #include "tools/commands/commands.h"
 
 namespace {
