@@ -100,7 +100,7 @@ TEST(AutoDirection, IsTheOneThatShowsMost) {
 /// A plate in plane stress: light along its normal, which is a principal direction, goes straight, and light along its
 /// edges makes a strip.
 TEST(AutoDirection, OfAPlateIsADiagonalThatFillsThePicture) {
-  const TensorGrid grid = dense_grid({{0, 0, 0}, {40, 20, 2}}, Eigen::Affine3d(Eigen::Scaling(0.1)),
+  const TensorGrid grid = dense_grid({Eigen::Vector3i::Zero(), {40, 20, 2}}, Eigen::Affine3d(Eigen::Scaling(0.1)),
                                      [](const Eigen::Vector3i& at) -> Matrix3d {
                                        return std::sin(0.3 * at.x()) * Vector3d(1, 0.2, 0).asDiagonal().toDenseMatrix();
                                      });
