@@ -215,6 +215,15 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
         return Field._of(_tensorray.read_field(vdb, keys, "", "none", None), keys)
 
 
+def needs_import(file):
+    """Whether a file is neither a scene, which begins with "{" or a comment, nor an OpenVDB file."""
+    name = os.fspath(file)
+    if name.endswith(".vdb") or name.lower().endswith(".json") or not os.path.isfile(name):
+        return False
+    with open(name, "rb") as stream:
+        return stream.read(4096).lstrip()[:1] not in (b"", b"{", b"/")
+
+
 def programs():
     """The folder `bin` of the build folder, or of the prefix, that has this package; or that of another `tensorray`."""
     parent = os.path.dirname(os.path.abspath(_tensorray.__file__))

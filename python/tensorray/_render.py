@@ -7,14 +7,14 @@ import functools
 import json
 import os
 import tempfile
-from typing import Any, Sequence
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _shards, _tensorray
 from ._arguments import Changes, Executor, Path, Progress, Scene, request_of
-from ._fields import Field
+from ._fields import Field, import_file, needs_import
 from ._progress import shown
 
 _PHOTON = np.dtype([("position", "f4", 3), ("direction", "f4", 3), ("origin", "f4", 3), ("wavelength", "f4"),
@@ -23,12 +23,14 @@ _PHOTON = np.dtype([("position", "f4", 3), ("direction", "f4", 3), ("origin", "f
 
 def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: Path | Sequence[Path] = (),
            keep: str | Sequence[str] = (), changes: Changes = None, frame: int | None = None, seed: int | None = None,
-           threads: int = 0, folder: Path | None = None, shards: int | None = None, executor: Executor | None = None,
-           shard_folder: Path | None = None, progress: Progress = None) -> Render:
+           threads: int = 0, folder: Path | None = None, imports: Mapping[str, Any] | None = None,
+           shards: int | None = None, executor: Executor | None = None, shard_folder: Path | None = None,
+           progress: Progress = None) -> Render:
     """Renders a scene, as `tensorray render` does.
 
-    scene     A dictionary with the keys of a scene file (docs/scenes.md, tr.schema()), or the name of a scene file or
-              of a field's file (.vdb). None: the light that `field` bends, on a plate.
+    scene     A dictionary with the keys of a scene file (docs/scenes.md, tr.schema()), or the name of a scene file, of
+              a field's file (.vdb) or of any file that tr.import_file reads. None: the light that `field` bends, on a
+              plate.
     field     A Field, instead of the scene's own `field.file` or `field.generate`. Other keys of the scene's `field`
               (scale, smooth, eigenvalues, bounds) stay.
     outputs   Names of files to write: their endings say what they hold, as with -o. The bytes are those that the
@@ -39,6 +41,7 @@ def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: 
     seed      Seed of all random numbers; None: the scene's.
     threads   Greatest number of threads, of each shard if there are such; 0: all. The result does not depend on it.
     folder    Relative paths in a dictionary are relative to this folder; None: the working folder.
+    imports   Arguments of tr.import_file, if `scene` is a file for it, as {"array": "stress", "order": "vtk"}.
     shards    Number of parts that the work is divided into, as by --shard of the command line; None: it is not divided.
               The result has the same bits.
     executor  What makes the shards: an object whose `submit` returns futures, as a ProcessPoolExecutor or Dask's
@@ -54,6 +57,10 @@ def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: 
         raise ValueError("executor, shard_folder: give the number of shards, too, as shards=4")
     if isinstance(scene, Field) and field is None:
         scene, field = None, scene
+    if isinstance(scene, (str, os.PathLike)) and needs_import(scene):
+        scene, field = None, import_file(scene, **(imports or {}), progress=progress)
+    elif imports:
+        raise ValueError("imports: only files that have to be imported have these choices")
     files = [outputs] if isinstance(outputs, (str, os.PathLike)) else outputs
     arguments = {"function": "render", "scene": scene, "field": field, "changes": changes, "frame": frame,
                  "folder": folder, "seed": seed, "outputs": [os.fspath(name) for name in files],

@@ -22,9 +22,13 @@ namespace {
 constexpr double default_margin = 1.25;    // Size of the plate, in extents of the beam.
 constexpr double default_distance = 0.25;  // Distance of the plate behind the volume, in depths of the volume.
 constexpr double max_size = 1e5;  // Largest size of the scene, in sizes of the volume: Embree is single precision.
-constexpr double narrowest_white = 100;  // nm: light of a narrower range has no white.
-constexpr double max_stretch = 1.05;     // Pixels' longer side over the shorter one.
-constexpr int default_resolution = 512;  // Pixels along the plate's longer side.
+constexpr double narrowest_white = 100;   // nm: light of a narrower range has no white.
+constexpr double max_stretch = 1.05;      // Pixels' longer side over the shorter one.
+constexpr int default_resolution = 512;   // Pixels along the plate's longer side.
+constexpr int least_resolution = 128;     // Pixels along its shorter side, if those along the longer one ...
+constexpr int most_resolution = 2048;     // ... are not more than this.
+constexpr double narrowest_plate = 0.25;  // Its shorter side, as a part of the longer one, where the size is not given.
+constexpr double visible = 0.02;          // AutoScale::shown; a picture that shows less looks empty.
 
 BlockSource open_field(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
@@ -147,11 +151,14 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
   if (normal.dot(beam.direction) > 0) normal = -normal;
   plate.up = upright(normal, receiver.up.value_or(beam.up));
   plate.right = plate.up.cross(normal);
-  plate.size = receiver.size ? *receiver.size : Eigen::Vector2d(default_margin * lit_extent(plate, beam));
+  plate.size = receiver.size.value_or(default_margin * lit_extent(plate, beam));
+  if (!receiver.size) plate.size = plate.size.cwiseMax(narrowest_plate * plate.size.maxCoeff());
   if (!(plate.size.minCoeff() > 0) || !plate.size.allFinite())
     throw SceneError(description.path.string() +
                      ": `/receiver`: no light falls on the plate; give its `size` and `center`");
-  const Eigen::Vector2d pixels = default_resolution * plate.size / plate.size.maxCoeff();
+  const double longer = std::clamp(least_resolution * plate.size.maxCoeff() / plate.size.minCoeff(),
+                                   double{default_resolution}, double{most_resolution});
+  const Eigen::Vector2d pixels = longer * plate.size / plate.size.maxCoeff();
   plate.resolution = receiver.resolution.value_or(pixels.array().round().max(1).cast<int>().matrix());
   return plate;
 }
@@ -168,6 +175,22 @@ void note_pixels(const ReceiverDescription& receiver, const Plate& plate, std::v
                   "pixels are squares",
                   pixel.maxCoeff() / pixel.minCoeff(), pixel.x() > pixel.y() ? "wide" : "high",
                   pixel.x() > pixel.y() ? "high" : "wide", square.x(), square.y()));
+}
+
+/// Where light falls on the plate before it has crossed the volume, the picture does not show what bends it then.
+void note_place(const Plate& plate, const Beam& beam, const TensorField& field, std::vector<std::string>& notes) {
+  const double towards = plate.normal().dot(beam.direction) > 0 ? 1 : -1;
+  double nearest = std::numeric_limits<double>::infinity(), farthest = -nearest;
+  for (const Eigen::Vector3d& corner : field.corners()) {
+    const double behind = towards * (corner - plate.center).dot(plate.normal());
+    nearest = std::min(nearest, behind);
+    farthest = std::max(farthest, behind);
+  }
+  if (farthest > 1e-6 * (farthest - nearest))
+    notes.push_back(
+        fmt::format("warning: the plate lies {} the volume as the light sees it, so that light falls on it "
+                    "before the field bends it; move `receiver.center` along the light, or leave it out",
+                    nearest < 0 ? "in" : "before"));
 }
 
 [[noreturn]] void fail_size(const SceneDescription& description, const char* pointer) {
@@ -217,21 +240,40 @@ Surfaces load_surfaces(const SceneDescription& description, const TensorField& f
   return surfaces;
 }
 
+/// What to do about a given scale that shows hardly anything; empty: it shows enough, or no other one would.
+std::string advice_on(const AutoScale& given, const AutoScale& best) {
+  if (given.shown >= visible || best.shown <= 2 * given.shown) return "";
+  const bool is_tangled = std::abs(given.scale) > best.scale;
+  return fmt::format("warning: {}: `field.scale` {:.3g} shows {:.0f}% of the field, {:.3g} shows {:.1g}%",
+                     is_tangled ? "light is tangled" : "light turns too little to be seen", best.scale,
+                     100 * best.shown, given.scale, 100 * given.shown);
+}
+
 /// The scale of the scene; without one, a scale that bends light visibly. The choice ignores obstacles and aperture, so
-/// that pictures with and without them can be compared.
+/// that pictures with and without them can be compared. @param flexibility  Of light in the middle of the spectrum.
 AutoScale load_scale(const SceneDescription& description, const TensorField& field, const Geometry& geometry,
-                     const Beam& beam, const Progress& progress, std::vector<std::string>& notes) {
-  if (description.field.scale) return {*description.field.scale, 0, 0};
+                     const Beam& beam, double flexibility, const Progress& progress, std::vector<std::string>& notes) {
+  const std::optional<double>& given = description.field.scale;
   const Geometry volume({geometry.surfaces().bounds, geometry.surfaces().cut, std::nullopt, {}});
-  const AutoScale scale =
-      choose_scale(field, volume, silhouette_beam(field.corners(), beam.direction, beam.up), progress);
-  if (scale.median_turn == 0)
+  const Beam light = silhouette_beam(field.corners(), beam.direction, beam.up);
+  const AutoScale scale = given ? judge_scale(field, volume, light, *given, flexibility, progress)
+                                : choose_scale(field, volume, light, progress);
+  if (scale.greatest_turn == 0) {
     notes.push_back(
-        "warning: no probe ray is turned (the field is zero or isotropic, or light travels along its "
-        "eigenvectors, or misses the volume); scale 1");
-  else
-    notes.push_back(fmt::format("scale: {:.6g} (at s = 0.2 the median ray turns by {:.3f} rad; shown: {:.0f}%)",
-                                scale.scale, scale.median_turn, 100 * scale.shown));
+        fmt::format("warning: no probe ray is turned (the field is zero or isotropic, or light travels along its "
+                    "eigenvectors, or misses the volume); scale {:g}",
+                    scale.scale));
+    return scale;
+  }
+  notes.push_back(fmt::format(
+      "scale: {:.6g}{} (at s = {:.3g} the median ray turns by {:.3f} rad, the one that turns most by {:.3f}; shown: "
+      "{:.0f}%)",
+      scale.scale, scale.scale < 0 ? ", negative: light bends the other way," : "", given ? flexibility : 0.2,
+      scale.median_turn, scale.greatest_turn, 100 * scale.shown));
+  if (given && scale.shown < visible && description.integrator.method().needs_light_direction(description)) {
+    const std::string advice = advice_on(scale, choose_scale(field, volume, light, progress));
+    if (!advice.empty()) notes.push_back(advice);
+  }
   return scale;
 }
 
@@ -243,8 +285,8 @@ Eigen::Vector3d load_direction(const SceneDescription& description, const Tensor
                                                 description.light.up.value_or(Eigen::Vector3d::UnitZ()), progress);
   const Eigen::Vector3d V = chosen.direction + Eigen::Vector3d::Zero();  // 0, not -0.
   if (description.integrator.method().needs_light_direction(description))
-    notes.push_back(
-        fmt::format("light: along [{:g}, {:g}, {:g}], where it shows most of the six axes", V.x(), V.y(), V.z()));
+    notes.push_back(fmt::format("light: along [{:.3g}, {:.3g}, {:.3g}], where it shows most of 26 directions", V.x(),
+                                V.y(), V.z()));
   return V;
 }
 
@@ -319,6 +361,7 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
   Beam beam = make_beam(description, loaded.field);
   Geometry geometry(load_surfaces(description, loaded.field, beam));
   note_pixels(description.receiver, *geometry.surfaces().plate, notes);
+  if (description.receiver.center) note_place(*geometry.surfaces().plate, beam, loaded.field, notes);
   Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(light.color));
   scene.eigenvalues = loaded.eigenvalues;
   scene.non_finite = loaded.non_finite;
@@ -326,7 +369,8 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
   scene.channels = channels_of(light.bands, description.bending);
   scene.spectrum = std::move(light.spectrum);
   scene.bands = std::move(light.bands);
-  scene.scale = load_scale(description, scene.field, scene.geometry, scene.beam, progress, notes);
+  const double flexibility = scene.channels[scene.channels.size() / 2].flexibility;
+  scene.scale = load_scale(description, scene.field, scene.geometry, scene.beam, flexibility, progress, notes);
   scene.bending = description.bending.settings;
   scene.bending.scale = scene.scale.scale;
   scene.method = description.integrator.method().load(scene, notes);

@@ -43,6 +43,11 @@ class PackageTest(unittest.TestCase):
             file = os.path.join(folder, "t.npy")
             np.save(file, tensors.reshape(4, 5, 6, 9))
             field = tr.import_file(file)
+            changes = {"receiver.resolution": 16, "light.wavelengths.count": 2, "light.photons": 100}
+            arrived = tr.render(file, imports={"voxel_size": 1}, changes=changes)
+            np.testing.assert_array_equal(arrived.linear, tr.render(field, changes=changes).linear)
+            with self.assertRaisesRegex(ValueError, "imports: only files that have to be imported"):
+                tr.render(field, imports={"voxel_size": 1})
             with self.assertRaisesRegex(RuntimeError, "nothing.vtu"):
                 tr.import_file(os.path.join(folder, "nothing.vtu"))
             for arguments, options in [((file,), {"order": "wrong"}), ((file,), {"step": "late"}), ((), {})]:

@@ -20,10 +20,4 @@ void add_derive_command(CLI::App& program, Progress& progress);   ///< tensorray
 void add_info_command(CLI::App& program);                         ///< tensorray info FILE.vdb: what a file holds.
 void add_schema_command(CLI::App& program);                       ///< tensorray schema: the JSON Schema of scenes.
 
-/// Replaces this program by `tensorray-import`, which runs `tensorray import`, because only `tensorray-import`
-/// contains VTK.
-/// @param arguments  Those of main, from "import" on.
-/// @throw std::runtime_error with the fix if `tensorray-import` is not built.
-[[noreturn]] void become_import_program(char** arguments);
-
 }  // namespace tensorray

@@ -19,10 +19,11 @@
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
+#include "tools/command_line/imported_field.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/commands/commands.h"
-#include "tools/commands/imported_field.h"
+#include "tracing/scale/auto_scale.h"
 
 namespace tensorray {
 namespace {
@@ -33,20 +34,12 @@ const std::vector<std::string> quick{"integrator.density={\"kind\":\"gaussian\",
                                      "light.wavelengths.count=16", "light.wavelengths.per_photon=4"};
 constexpr int gap = 8;  // Pixels about the pictures.
 
-struct Direction {
-  const char* name;
-  const char* vector;
-};
-
-constexpr std::array<Direction, 6> directions{{{"+x", "[1,0,0]"},
-                                               {"-x", "[-1,0,0]"},
-                                               {"+y", "[0,1,0]"},
-                                               {"-y", "[0,-1,0]"},
-                                               {"+z", "[0,0,1]"},
-                                               {"-z", "[0,0,-1]"}}};  // One column each.
+constexpr std::size_t columns = 6;  // Directions of the light.
 
 struct ExploreOptions {
-  std::string scene;
+  std::vector<std::filesystem::path> files;
+  std::filesystem::path scene;  // The file, or the field made of the files.
+  ImportChoices import;
   std::vector<std::string> overrides;
   std::string sheet, scene_copy;
   std::optional<int> pick;
@@ -78,7 +71,7 @@ class Sheet {
       : size_(size),
         letters_(std::max(6.0, size / 20.0)),
         row_(size + static_cast<int>(2 * letters_) + gap),
-        image_(static_cast<int>(directions.size()) * (size + gap) + gap, static_cast<int>(factors.size()) * row_ + gap,
+        image_(static_cast<int>(columns) * (size + gap) + gap, static_cast<int>(factors.size()) * row_ + gap,
                {"R", "G", "B"}) {
     std::fill(image_.pixels.begin(), image_.pixels.end(), 0.15f);
   }
@@ -126,8 +119,26 @@ std::string pixels_of(const Plate& plate, int size) {
   return fmt::format("receiver.resolution=[{},{}]", pixels.x(), pixels.y());
 }
 
-/// Calls `visit(column, row, number, scene, description)` for each cell, with the field loaded once. `description` is
-/// the cell's scene with its pictures' size left open.
+/// The directions that show most, those that show more first.
+std::vector<Eigen::Vector3d> directions_of(const Scene& scene, const Progress& progress) {
+  const Surfaces& all = scene.geometry.surfaces();
+  const Geometry volume({all.bounds, all.cut, std::nullopt, {}});
+  std::vector<Eigen::Vector3d> directions;
+  for (const AutoDirection& each : rank_directions(scene.field, volume, Eigen::Vector3d::UnitZ(), progress))
+    if (directions.size() < columns) directions.push_back(each.direction);
+  return directions;
+}
+
+/// "+x-z" is along (1, 0, −1).
+std::string name_of(const Eigen::Vector3d& direction) {
+  std::string name;
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::abs(direction[axis]) > 0.1) name += fmt::format("{}{}", direction[axis] > 0 ? '+' : '-', "xyz"[axis]);
+  return name;
+}
+
+/// Calls `visit(column, row, number, name, scene, description)` for each cell, with the field loaded once. `name` is
+/// that of the direction, `description` the cell's scene with its pictures' size left open.
 template <class Visit>
 void for_each_cell(const ExploreOptions& options, const Progress& progress, const Visit& visit) {
   std::optional<Scene> scene;
@@ -135,8 +146,11 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
     Scene next = load_scene(description, progress, field_of(scene, description));
     scene.emplace(std::move(next));
   };
-  for (std::size_t column = 0; column < directions.size(); ++column) {
-    const std::string direction = fmt::format("light.direction={}", directions[column].vector);
+  load(with(options, {"light.direction=[0,0,-1]"}));
+  const std::vector<Eigen::Vector3d> directions = directions_of(*scene, progress);
+  for (std::size_t column = 0; column < columns; ++column) {
+    const Eigen::Vector3d& V = directions[column];
+    const std::string direction = fmt::format("light.direction=[{},{},{}]", V.x(), V.y(), V.z());
     load(with(options, {direction}));
     const double scale = scene->scale.scale;
     const std::string pixels = pixels_of(*scene->geometry.surfaces().plate, options.size);
@@ -147,7 +161,7 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
                      {direction, scaled, pixels, fmt::format("camera.resolution=[{0},{0}]", options.size),
                       fmt::format("integrator.stretch.pixels={}", options.size)});
       load(with(options, changes));
-      visit(column, row, static_cast<int>(row * directions.size() + column) + 1, *scene,
+      visit(column, row, static_cast<int>(row * columns + column) + 1, name_of(V), *scene,
             with(options, {direction, scaled}));
     }
   }
@@ -164,17 +178,17 @@ void check(const ExploreOptions& options, const SceneDescription& description) {
     throw std::invalid_argument("nothing to do: give -o SHEET.png, or --pick N --save-scene FILE.json");
   if (options.pick.has_value() != !options.scene_copy.empty())
     throw std::invalid_argument("--pick and --save-scene belong together");
-  if (!options.scene_copy.empty() && !is_field_file(options.scene))
-    throw std::invalid_argument("--save-scene: only for a field (.vdb); of a scene, change a copy by hand");
+  if (!options.scene_copy.empty() && !is_field_file(options.files.front()))
+    throw std::invalid_argument(
+        "--save-scene: only for a field (.vdb), which stays; of a scene, change a copy by hand");
   require_distinct_files(input_files(description), {{options.sheet, "-o"}, {options.scene_copy, "--save-scene"}});
 }
 
-void explore(const ExploreOptions& options, Progress& progress) {
+void explore(ExploreOptions options, Progress& progress) {
   const Threads threads(options.threads);
   set_image_threads(static_cast<int>(running_threads()));
-  if (needs_import(options.scene))
-    throw std::invalid_argument(printable(options.scene) + ": make a field of it first, with `tensorray import " +
-                                printable(options.scene) + " -o FIELD.vdb`");
+  const std::optional<ImportedField> imported = import_field(options.files, options.import, options.quiet);
+  options.scene = imported ? imported->path() : options.files.front();
   check(options, with(options, {}));
   std::vector<OutputFile> files;
   for (const std::string& file : {options.sheet, options.scene_copy})
@@ -186,19 +200,19 @@ void explore(const ExploreOptions& options, Progress& progress) {
   int done = 0;
   Progress within;  // The bar shows cells, not the phases of each.
   within.report = [&](const std::string&, std::uint64_t, std::uint64_t) {
-    progress.update("exploring", static_cast<std::uint64_t>(done), factors.size() * directions.size());
+    progress.update("exploring", static_cast<std::uint64_t>(done), factors.size() * columns);
   };
-  for_each_cell(
-      options, within,
-      [&](std::size_t column, std::size_t row, int number, const Scene& scene, const SceneDescription& description) {
-        if (options.pick == number) picked = description.text;
-        if (!options.sheet.empty()) {
-          const Render rendered = render(scene, within);
-          sheet.draw(column, row, display_image(scene, rendered, false),
-                     fmt::format("{}  {}  scale {:.3g}", number, directions[column].name, scene.scale.scale));
-        }
-        ++done;
-      });
+  for_each_cell(options, within,
+                [&](std::size_t column, std::size_t row, int number, const std::string& name, const Scene& scene,
+                    const SceneDescription& description) {
+                  if (options.pick == number) picked = description.text;
+                  if (!options.sheet.empty()) {
+                    const Render rendered = render(scene, within);
+                    sheet.draw(column, row, display_image(scene, rendered, false),
+                               fmt::format("{}  {}  scale {:.3g}", number, name, scene.scale.scale));
+                  }
+                  ++done;
+                });
   bar.reset();
   if (!options.sheet.empty())
     files.front().write([&](const std::filesystem::path& path) { write_image(path, sheet.image()); });
@@ -214,16 +228,20 @@ void explore(const ExploreOptions& options, Progress& progress) {
 void add_explore_command(CLI::App& program, Progress& progress) {
   const auto options = std::make_shared<ExploreOptions>();
   CLI::App* command = program.add_subcommand(
-      "explore", "Show what a field does to light: one sheet of pictures, light from six sides, at three scales");
-  command->add_option("FIELD", options->scene, "Field (.vdb), or a scene file")->required();
+      "explore",
+      "Show what a field does to light: one sheet of pictures, light along the six directions that show most, at three "
+      "scales");
+  command->add_option("FIELD", options->files, "Field (.vdb), a scene file, or files that `tensorray import` reads")
+      ->required();
   command->add_option("-o,--output", options->sheet, "The sheet: .png .jpg .tif");
   command->add_option("--set", options->overrides, "KEY=VALUE: change a value of all scenes")->allow_extra_args(false);
   command->add_option("--size", options->size, "Of a picture: pixels along its longer side (200)")
       ->check(CLI::Range(16, 2048));
   command->add_option("--pick", options->pick, "Number of the picture whose scene --save-scene writes")
-      ->check(CLI::Range(1, static_cast<int>(factors.size() * directions.size())));
+      ->check(CLI::Range(1, static_cast<int>(factors.size() * columns)));
   command->add_option("--save-scene", options->scene_copy, "Write the scene of --pick to this JSON file");
   command->add_option("--threads", options->threads, "Number of threads (all)")->check(CLI::Range(1, 4096));
+  add_import_options(*command, options->import);
   command->add_flag("-q,--quiet", options->quiet, "Print nothing but errors");
   command->callback([options, &progress] { explore(*options, progress); });
 }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "base/text/path_text.h"
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
+#include "tools/command_line/imported_field.h"
 #include "tools/command_line/threads.h"
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
@@ -29,7 +31,9 @@ using Json = nlohmann::ordered_json;
 constexpr double voxel_step_flexibility = 0.3;  // The strongest flexibility in the paper.
 
 struct InfoOptions {
-  std::filesystem::path file;
+  std::vector<std::filesystem::path> files;
+  ImportChoices import;
+  std::filesystem::path field_file;  ///< The file, or the field made of the files.
   std::string field;
   Derive derive = Derive::none;
   bool json = false;
@@ -50,7 +54,7 @@ struct FieldInfo {
 };
 
 FieldInfo field_info(const InfoOptions& options, const std::string& name) {
-  TensorGrid grid = read_tensor_vdb(options.file, name, options.derive);
+  TensorGrid grid = read_tensor_vdb(options.field_file, name, options.derive);
   FieldInfo info{grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid), grid.surface, {}};
   if (info.statistics.active_voxels > info.statistics.non_finite) {
     const Border border = grid.surface.triangles.empty() ? Border::fade : Border::extend;
@@ -124,7 +128,7 @@ Json to_json(const FieldInfo& field) {
 }
 
 void print_json(const InfoOptions& options, const std::vector<GridInfo>& grids, const std::vector<FieldInfo>& fields) {
-  Json json = {{"file", text_of_path(options.file)}, {"grids", Json::array()}, {"fields", Json::array()}};
+  Json json = {{"file", text_of_path(options.files.front())}, {"grids", Json::array()}, {"fields", Json::array()}};
   for (const GridInfo& grid : grids)
     json["grids"].push_back({{"name", grid.name}, {"type", grid.type}, {"storage", grid.storage}});
   for (const FieldInfo& field : fields) json["fields"].push_back(to_json(field));
@@ -206,7 +210,7 @@ void print_field(const FieldInfo& field) {
 void print_text(const InfoOptions& options, const std::vector<GridInfo>& grids, const std::vector<FieldInfo>& fields) {
   std::size_t width = 4;
   for (const GridInfo& grid : grids) width = std::max(width, grid.name.size());
-  fmt::print("{}\n  {:<{}}  {:<10}  {}\n", options.file.string(), "grid", width, "type", "stored as");
+  fmt::print("{}\n  {:<{}}  {:<10}  {}\n", options.files.front().string(), "grid", width, "type", "stored as");
   for (const GridInfo& grid : grids) fmt::print("  {:<{}}  {:<10}  {}\n", grid.name, width, grid.type, grid.storage);
   for (const FieldInfo& field : fields) print_field(field);
   if (fields.empty())
@@ -215,9 +219,15 @@ void print_text(const InfoOptions& options, const std::vector<GridInfo>& grids, 
         "grid, and `field.derive` in a scene makes it\n");
 }
 
-void info(const InfoOptions& options) {
+void info(InfoOptions options) {
   const Threads threads;
-  const std::vector<GridInfo> grids = list_vdb(options.file);
+  const std::optional<ImportedField> imported = import_field(options.files, options.import, false);
+  options.field_file = imported ? imported->path() : options.files.front();
+  if (!imported) {
+    std::signal(SIGINT, SIG_DFL);  // This command writes no file, so Ctrl-C may end it at once.
+    std::signal(SIGTERM, SIG_DFL);
+  }
+  const std::vector<GridInfo> grids = list_vdb(options.field_file);
   const std::vector<FieldInfo> fields = field_infos(options, grids);
   (options.json ? print_json : print_text)(options, grids, fields);
 }
@@ -226,8 +236,10 @@ void info(const InfoOptions& options) {
 
 void add_info_command(CLI::App& program) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App* command = program.add_subcommand("info", "Tell what an OpenVDB file holds");
-  command->add_option("file", options->file, "The file, FILE.vdb")->required();
+  CLI::App* command = program.add_subcommand("info", "Tell what an OpenVDB file, or another program's, holds");
+  command
+      ->add_option("file", options->files, "The file, FILE.vdb, or files that `tensorray import` reads: of their field")
+      ->required();
   command->add_option("--field", options->field, "Only this tensor field; without it, all");
   command
       ->add_option("--derive", options->derive,
@@ -235,12 +247,9 @@ void add_info_command(CLI::App& program) {
                    "vector grid, or the hessian of a scalar grid")
       ->transform(CLI::Transformer(
           std::map<std::string, Derive>{{"gradient", Derive::gradient}, {"hessian", Derive::hessian}}));
+  add_import_options(*command, options->import);
   command->add_flag("--json", options->json, "As JSON");
-  command->callback([options] {
-    std::signal(SIGINT, SIG_DFL);  // This command writes no file, so Ctrl-C may end it at once.
-    std::signal(SIGTERM, SIG_DFL);
-    info(*options);
-  });
+  command->callback([options] { info(*options); });
 }
 
 void add_schema_command(CLI::App& program) {

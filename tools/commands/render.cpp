@@ -11,8 +11,8 @@
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
 #include "scenes/source/overrides.h"
+#include "tools/command_line/imported_field.h"
 #include "tools/commands/commands.h"
-#include "tools/commands/imported_field.h"
 #include "tools/ranks/ranks.h"
 #include "tools/rendering/render_scene.h"
 
@@ -20,7 +20,7 @@ namespace tensorray {
 namespace {
 
 struct RenderOptions {
-  std::string scene;
+  std::vector<std::filesystem::path> files;  // A scene, a field, or files of one import.
   SceneChanges changes;
   std::optional<std::uint64_t> seed;
   std::string error;
@@ -86,22 +86,15 @@ void report_failed(const std::vector<int>& failed) {
                                        fmt::join(failed, ",")));
 }
 
-/// The flags of an import as they were given, each after a blank.
-std::string flags_of(const ImportChoices& import) {
-  std::string flags;
-  for (const auto& [flag, value] : import)
-    if (!value.empty()) flags += fmt::format(" {} '{}'", flag, printable(value));
-  return flags;
-}
-
-/// Renders another program's file. Its pictures are named after the file.
-void render_import(const std::string& file, SceneChanges changes, const RenderOptions& options, Progress& progress) {
+/// Renders other programs' files. Its pictures are named after the first.
+void render_import(SceneChanges changes, const RenderOptions& options, Progress& progress) {
+  const std::filesystem::path& file = options.files.front();
   if (!options.frames.empty()) throw std::invalid_argument("--frames: import the files first, with `tensorray import`");
   if (!options.shard.empty() || options.run.keeping.resume)
     throw std::invalid_argument("--shard, --resume: import the file first, with `tensorray import`");
   if (!options.run.scene_copy.empty())
     throw std::invalid_argument("--save-scene: a scene needs a field that stays; make it with `tensorray import " +
-                                printable(file) + flags_of(options.import) + " -o FIELD.vdb`");
+                                printable(file.string()) + flags_of(options.import) + " -o FIELD.vdb`");
   if (changes.outputs.empty()) {
     std::filesystem::path name(file);
     while (name.has_extension()) name.replace_extension();  // .nii.gz
@@ -109,10 +102,12 @@ void render_import(const std::string& file, SceneChanges changes, const RenderOp
   }
   std::vector<NamedFile> outputs{{options.run.statistics, "--stats"}};
   for (const std::filesystem::path& output : changes.outputs) outputs.push_back({output, "-o"});
-  require_distinct_files({{file, "the input"}}, outputs);
+  std::vector<NamedFile> inputs;
+  for (const std::filesystem::path& input : options.files) inputs.push_back({input, "the input"});
+  require_distinct_files(inputs, outputs);
   ImportChoices choices = options.import;
   if (options.run.memory > 0) choices["--memory"] = std::to_string(options.run.memory);
-  const ImportedField field(file, choices, options.run.quiet);
+  const ImportedField field(options.files, choices, options.run.quiet);
   RenderRun run = options.run;
   run.keeping.is_on = false;  // The field does not stay.
   render_scene(field.path(), changes, run, progress);
@@ -122,15 +117,13 @@ void render_import(const std::string& file, SceneChanges changes, const RenderOp
 std::vector<int> render(const RenderOptions& options, Ranks* ranks, Progress& progress) {
   if (!is_root(ranks)) broadcast(ranks, true);  // The root has found nothing wrong with the command line.
   SceneChanges changes = changes_of(options);
-  if (needs_import(options.scene)) {
+  const std::filesystem::path& scene = options.files.front();
+  if (needs_import(scene)) {
     if (ranks) throw std::invalid_argument("mpirun: import the file first, with `tensorray import`");
-    render_import(options.scene, changes, options, progress);
+    render_import(changes, options, progress);
     return {};
   }
-  if (const std::string flags = flags_of(options.import); !flags.empty()) {
-    if (!std::filesystem::exists(options.scene)) throw std::runtime_error(printable(options.scene) + " does not exist");
-    throw std::invalid_argument(flags.substr(1) + ": only files that have to be imported have this choice");
-  }
+  refuse_import(options.files, options.import);
   RenderRun run = options.run;
   run.ranks = ranks;
   if (!options.shard.empty()) take_shard(options.shard, changes, run.keeping);
@@ -138,10 +131,10 @@ std::vector<int> render(const RenderOptions& options, Ranks* ranks, Progress& pr
     throw std::invalid_argument("--save-scene: not for several frames");
   if (is_root(ranks)) broadcast(ranks, true);
   if (options.frames.empty()) {
-    render_scene(options.scene, changes, run, progress);
+    render_scene(scene, changes, run, progress);
     return {};
   }
-  return render_frames(options.scene, changes, parse_frames(options.frames), run, progress);
+  return render_frames(scene, changes, parse_frames(options.frames), run, progress);
 }
 
 /// The root says what is wrong for all; other ranks, what is wrong with them alone.
@@ -171,7 +164,7 @@ void add_render_command(CLI::App& program, Progress& progress) {
   const auto options = std::make_shared<RenderOptions>();
   CLI::App* command = program.add_subcommand("render", "Render a scene file, or a field, to pictures");
   command
-      ->add_option("SCENE", options->scene,
+      ->add_option("SCENE", options->files,
                    "Scene file (JSON; `tensorray schema` prints its keys); or a field, as .vdb or any file that "
                    "`tensorray import` reads: the light that it bends, with all defaults")
       ->required();
@@ -217,11 +210,7 @@ void add_render_command(CLI::App& program, Progress& progress) {
       ->transform(CLI::AsSizeValue(false))
       ->option_text("SIZE");
   command->add_flag("--watch", options->run.keeping.watch, "Keep the pictures up to date while they are rendered");
-  for (const auto& [flag, meaning] : {std::pair("--order", "Of the tensor's components, as for `tensorray import`"),
-                                      std::pair("--array", "The array that is the tensor, likewise"),
-                                      std::pair("--gradient-of", "The velocity whose gradient it is, likewise"),
-                                      std::pair("--frame", "The axes of the components, likewise")})
-    command->add_option(flag, options->import[flag], meaning)->group("Import");
+  add_import_options(*command, options->import);
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");
   command->callback([options, &progress] { render_alone_or_with_others(*options, progress); });
 }

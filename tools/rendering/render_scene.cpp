@@ -59,6 +59,16 @@ std::string run_statistics(const Scene& scene, const Statistics& statistics, dou
   return json.dump(2) + "\n";
 }
 
+/// The scene's text, with what was chosen for it, so that it looks the same with a field that has changed.
+std::string scene_as_rendered(const Scene& scene) {
+  auto json = parse_value(scene.description.text);
+  json["field"]["scale"] = scene.scale.scale;
+  const Eigen::Vector3d& V = *scene.description.light.direction;
+  if (json.contains("light") && json["light"].value("direction", Json()) == "auto")
+    json["light"]["direction"] = {V.x(), V.y(), V.z()};
+  return json.dump(2) + "\n";
+}
+
 /// Renders what is left of the job. @throw Interrupted if it is cancelled, but some of its work is kept: with the
 /// picture so far, if there is one.
 Render render_or_keep(const Scene& scene, RenderJob& job, Checkpoint& checkpoint, const Progress& progress) {
@@ -90,7 +100,7 @@ void write_or_keep(const Scene& scene, const Render& result, Checkpoint& checkpo
     write_outputs(result, scene, files);
     if (!run.statistics.empty())
       files.at(statistics_key).write_text(run_statistics(scene, result.statistics, seconds_since(start), run));
-    if (!run.scene_copy.empty()) files.at(scene_key).write_text(parse_value(scene.description.text).dump(2) + "\n");
+    if (!run.scene_copy.empty()) files.at(scene_key).write_text(scene_as_rendered(scene));
     commit_outputs(std::move(files));
   } catch (const std::exception&) {  // The disk may be full.
     if (checkpoint.write())

@@ -59,6 +59,7 @@ Json hello(const ViewedScene& viewed, const Json& scene, const Json& field) {
           {"field", field},
           {"schema", Json::parse(scene_schema())},
           {"file", viewed.file.string()},
+          {"command", viewed.command},
           {"saves", viewed.copy.string()}};
 }
 
@@ -395,6 +396,8 @@ void Pages::space(Page& page, const Json& message) {
 
 void Pages::save(Page& page, const Json& message) {
   check(message["scene"]);
+  if (viewed_.copy.empty())
+    throw std::invalid_argument("a scene needs a field that stays; make it with `tensorray import`, and view that");
   require_no_device(viewed_.copy);
   OutputFile file(viewed_.copy);
   file.write_text(message["scene"].dump(2) + "\n");

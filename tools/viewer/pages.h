@@ -35,7 +35,8 @@ struct PageMessage {
 struct ViewedScene {
   std::filesystem::path file;
   std::vector<std::string> overrides;
-  std::filesystem::path copy;  ///< Pages may save their scene to this file.
+  std::filesystem::path copy;             ///< Pages may save their scene to this file; empty: they may not.
+  std::vector<std::string> command = {};  ///< What renders the scene from any folder: the program and its arguments.
 };
 
 /// Answers the messages of all pages (their protocol: tools/viewer/page/src/state/protocol.ts). One thread renders, for

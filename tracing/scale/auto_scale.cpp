@@ -23,6 +23,8 @@ constexpr double first_turn = 0.015;  // No ray turns by more at the first scale
 // A scale that shows less than this, with less turn, is too small. A few rays tell: one of so many.
 constexpr double weak_shown = 0.1, weak_turn = 0.05;
 constexpr std::size_t few = 4;
+constexpr double narrow = 0.25;        // A silhouette that is narrower, as a part of its length, is worth less.
+constexpr double least_better = 1.02;  // A direction is better than one before it if it is worth more than this.
 constexpr double min_shown = 1e-6, min_gain = 1.5;  // Less may be rounding, or not be what grows with the scale.
 constexpr int doublings = 30, halvings = 8;
 constexpr int patience = 12;             // Doublings after which light that has not turned at all will not.
@@ -81,6 +83,7 @@ AutoScale summary(double scale, std::vector<double> turns, const std::vector<dou
               turns.end());
   if (turns.empty()) return result;
   result.bent_fraction = static_cast<double>(turns.size()) / rays;
+  result.greatest_turn = *std::max_element(turns.begin(), turns.end());
   const auto median = turns.begin() + static_cast<std::ptrdiff_t>(turns.size() / 2);
   std::nth_element(turns.begin(), median, turns.end());
   result.median_turn = *median;
@@ -142,9 +145,9 @@ AutoScale turned(const std::vector<AutoScale>& tried) {
   return most;
 }
 
-}  // namespace
-
-AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress) {
+/// As choose_scale. @param each  As for `probe`.
+AutoScale find_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress,
+                     std::size_t each) {
   const double norm = field.max_norm();
   if (norm == 0) return {};
   const ProbeBeam probes = probe_beam(field, beam);
@@ -155,7 +158,7 @@ AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const
   std::vector<AutoScale> tried;
   AutoScale best;
   for (int i = 0; i < doublings; ++i, scale *= 2) {
-    tried.push_back(probe(field, geometry, probes, scale, progress));
+    tried.push_back(probe(field, geometry, probes, scale, progress, each));
     if (tried.size() > 1 && tried.back().median_turn > max_turn) break;
     if (tried.back().shown > best.shown) best = tried.back();
     if (tried.back().shown < tangled_part * best.shown) break;
@@ -164,28 +167,71 @@ AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const
   if (best.shown == 0) return turned(tried);
   const double wanted = wanted_part * best.shown;
   AutoScale low, high;
-  for (const AutoScale& each : tried) {
+  for (const AutoScale& next : tried) {
     low = high;
-    high = each;
+    high = next;
     if (high.shown >= wanted) break;
   }
   for (int i = 0; i < halvings && low.shown > 0; ++i) {
-    const AutoScale middle = probe(field, geometry, probes, (low.scale + high.scale) / 2, progress);
+    const AutoScale middle = probe(field, geometry, probes, (low.scale + high.scale) / 2, progress, each);
     (middle.shown < wanted ? low : high) = middle;
   }
   return high;
 }
 
+/// How much of a picture a silhouette can fill, as far as its shape tells: less than 1 for a strip.
+double fill_of(const Beam& beam) {
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : beam.aperture) box.extend(corner);
+  return std::min(1.0, box.sizes().minCoeff() / (narrow * box.sizes().maxCoeff()));
+}
+
+/// Along the axes first, then along the diagonals of faces, then of the cube.
+std::vector<Vector3d> axes_and_diagonals() {
+  std::vector<Vector3d> directions;
+  for (int parts = 1; parts <= 3; ++parts)
+    for (const double sign : {-1.0, 1.0})
+      for (int n = 26; n > 13; --n) {  // One of each pair of opposite ones.
+        const Vector3d direction = sign * Vector3d(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+        if (direction.cwiseAbs().sum() == parts) directions.push_back(direction.normalized());
+      }
+  return directions;
+}
+
+}  // namespace
+
+AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress) {
+  return find_scale(field, geometry, beam, progress, 1);
+}
+
+AutoScale judge_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, double scale,
+                      double flexibility, const Progress& progress) {
+  const double strength = scale * flexibility / probe_flexibility;
+  AutoScale result = probe(field, geometry, probe_beam(field, beam), strength, progress);
+  result.scale = scale;
+  return result;
+}
+
+std::vector<AutoDirection> rank_directions(const TensorField& field, const Geometry& geometry, const Vector3d& up,
+                                           const Progress& progress) {
+  std::vector<AutoDirection> ranked;
+  for (const Vector3d& direction : axes_and_diagonals()) {
+    const Beam beam = silhouette_beam(field.corners(), direction, up);
+    const AutoScale scale = find_scale(field, geometry, beam, progress, few);
+    ranked.push_back({direction, scale, scale.shown * fill_of(beam)});
+  }
+  // Rounding does not decide between directions that symmetry makes equal: the first of them wins.
+  const double step = std::log(least_better);
+  const auto order = [&](const AutoDirection& d) { return d.worth > 0 ? std::floor(std::log(d.worth) / step) : -1e9; };
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [&](const AutoDirection& a, const AutoDirection& b) { return order(a) > order(b); });
+  return ranked;
+}
+
 AutoDirection choose_direction(const TensorField& field, const Geometry& geometry, const Vector3d& up,
                                const Progress& progress) {
-  AutoDirection best{-Vector3d::UnitZ(), {}};
-  for (const double sign : {-1.0, 1.0})
-    for (int axis = 2; axis >= 0; --axis) {
-      const Vector3d direction = sign * Vector3d::Unit(axis);
-      const AutoScale scale = choose_scale(field, geometry, silhouette_beam(field.corners(), direction, up), progress);
-      if (scale.shown > best.scale.shown) best = {direction, scale};
-    }
-  return best;
+  const AutoDirection best = rank_directions(field, geometry, up, progress).front();
+  return best.worth > 0 ? best : AutoDirection{-Vector3d::UnitZ(), {}};
 }
 
 }  // namespace tensorray

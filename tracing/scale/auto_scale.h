@@ -8,6 +8,8 @@
 /// x e^(1−x) of the field: 1 for a factor of e, less for a smaller change, and less for a greater one, where light is
 /// tangled. Rays that do not land show nothing.
 
+#include <vector>
+
 #include "base/process/progress.h"
 #include "renderer/lights/beam.h"
 #include "tracing/bending/bending.h"
@@ -18,6 +20,7 @@ namespace tensorray {
 struct AutoScale {
   double scale = 1;
   double median_turn = 0;    ///< Turn of the median bent ray from start to end, radians, at s = 0.2 and this scale.
+  double greatest_turn = 0;  ///< That of the ray that turns most.
   double bent_fraction = 0;  ///< Fraction of the probe rays that the field turns at all.
   double shown = 0;          ///< What the mean ray shows of the field, 0 to 1.
 };
@@ -29,13 +32,23 @@ struct AutoScale {
 /// @param geometry  Bounds and cut, without a plate. @throw Cancelled.
 AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress);
 
+/// The same values at a given scale. @param flexibility  s, instead of 0.2. @throw Cancelled.
+AutoScale judge_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, double scale,
+                      double flexibility, const Progress& progress);
+
 struct AutoDirection {
-  Eigen::Vector3d direction;
+  Eigen::Vector3d direction;  ///< Unit.
   AutoScale scale;
+  double worth = 0;  ///< What the picture shows: `scale.shown`, less where the silhouette is a strip.
 };
 
-/// Of the six directions along the world's axes the one with the greatest `shown`, each at the scale that choose_scale
-/// finds. −z if none shows anything. @throw as above.
+/// The 26 directions along the world's axes and the diagonals between them, those that show most first; each at the
+/// scale that choose_scale finds with a part of its rays. (Along its axes a part shows little: they are often principal
+/// directions of its tensors, along which light goes straight.) @throw as above.
+std::vector<AutoDirection> rank_directions(const TensorField& field, const Geometry& geometry,
+                                           const Eigen::Vector3d& up, const Progress& progress);
+
+/// The first of them; −z if none shows anything.
 AutoDirection choose_direction(const TensorField& field, const Geometry& geometry, const Eigen::Vector3d& up,
                                const Progress& progress);
 

@@ -97,6 +97,39 @@ TEST(AutoDirection, IsTheOneThatShowsMost) {
             -Vector3d::UnitZ());
 }
 
+/// A plate in plane stress: light along its normal, which is a principal direction, goes straight, and light along its
+/// edges makes a strip.
+TEST(AutoDirection, OfAPlateIsADiagonalThatFillsThePicture) {
+  const TensorGrid grid = dense_grid({Eigen::Vector3i::Zero(), {40, 20, 2}}, Eigen::Affine3d(Eigen::Scaling(0.1)),
+                                     [](const Eigen::Vector3i& at) -> Matrix3d {
+                                       return std::sin(0.3 * at.x()) * Vector3d(1, 0.2, 0).asDiagonal().toDenseMatrix();
+                                     });
+  const TensorField field(grid, {Interpolation::cubic, Border::extend});
+  const auto ranked = rank_directions(field, Geometry(surfaces_of(field)), Vector3d::UnitZ(), Progress());
+  EXPECT_EQ(ranked.size(), 26u);
+  for (std::size_t i = 1; i < ranked.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) EXPECT_LT(ranked[i].direction.dot(ranked[k].direction), 0.95);
+  const Vector3d V = ranked.front().direction;
+  EXPECT_GT(std::min(std::abs(V.x()), std::abs(V.z())), 0.5);
+  EXPECT_GT(ranked.front().worth, 0.1);
+  EXPECT_EQ(ranked.back().worth, 0);
+}
+
+TEST(AutoScale, AGivenScaleIsJudgedAsTheChosenOneWas) {
+  const TensorField field = cube_field(17, [](const Vector3d& p) -> Matrix3d {
+    return std::sin(3 * p.x()) * Vector3d(1, 0, 2).asDiagonal().toDenseMatrix() + Matrix3d::Ones() * p.y();
+  });
+  const Geometry geometry(surfaces_of(field));
+  const Beam beam = silhouette_beam(field.corners(), -Vector3d::UnitZ(), Vector3d::UnitY());
+  const AutoScale chosen = choose_scale(field, geometry, beam, Progress());
+  const auto judged = [&](double scale, double s) { return judge_scale(field, geometry, beam, scale, s, Progress()); };
+  EXPECT_DOUBLE_EQ(judged(chosen.scale, 0.2).shown, chosen.shown);
+  EXPECT_DOUBLE_EQ(judged(2 * chosen.scale, 0.1).median_turn, chosen.median_turn);
+  EXPECT_GT(chosen.greatest_turn, chosen.median_turn);
+  EXPECT_LT(judged(1e-4 * chosen.scale, 0.2).shown, 0.01);
+  EXPECT_LT(judged(1e4 * chosen.scale, 0.2).shown, 0.05);
+}
+
 TEST(AutoScale, FieldsThatTurnNoLightKeepTheirScale) {
   for (const double c : {0.0, 5.0}) {
     const AutoScale chosen = scale_of(constant_field(c * Matrix3d::Identity()));

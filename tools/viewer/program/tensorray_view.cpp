@@ -7,12 +7,14 @@
 #include <optional>
 #include <stdexcept>
 #include <system_error>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "base/process/child_program.h"
 #include "renderer/images/image.h"
+#include "tools/command_line/imported_field.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
@@ -27,6 +29,8 @@ constexpr std::uint16_t usual_port = 8787;
 constexpr int ports_to_try = 20;
 
 struct ViewOptions {
+  std::vector<std::filesystem::path> files;
+  ImportChoices import;
   ViewedScene viewed;
   ServerSettings server;
   std::optional<std::uint16_t> port;
@@ -54,6 +58,16 @@ void require_same_folder(const ViewedScene& viewed) {
                                 viewed.file.string() + ", to which paths in it are relative");
 }
 
+/// The command line that renders what is viewed, from any folder.
+std::vector<std::string> command_of(const ViewOptions& options) {
+  std::vector<std::string> words{sibling_program("tensorray").string(), "render"};
+  for (const std::filesystem::path& file : options.files) words.push_back(std::filesystem::absolute(file).string());
+  for (const auto& [flag, value] : options.import)
+    if (!value.empty()) words.insert(words.end(), {flag, value});
+  for (const std::string& change : options.viewed.overrides) words.insert(words.end(), {"--set", change});
+  return words;
+}
+
 /// The usual port, or if another program has it, one of the next.
 Server listen(const ViewOptions& options, Pages& pages) {
   ServerSettings settings = options.server;
@@ -70,8 +84,14 @@ Server listen(const ViewOptions& options, Pages& pages) {
 void view(ViewOptions options, Progress& progress) {
   const Threads threads(options.threads);
   set_image_threads(static_cast<int>(running_threads()));
-  if (options.viewed.copy.empty()) options.viewed.copy = default_copy(options.viewed.file);
-  require_same_folder(options.viewed);
+  const std::optional<ImportedField> imported = import_field(options.files, options.import, options.quiet);
+  options.viewed.file = imported ? imported->path() : options.files.front();
+  if (imported && !options.viewed.copy.empty())
+    throw std::invalid_argument("--save-scene: a scene needs a field that stays; make it with `tensorray import " +
+                                options.files.front().string() + flags_of(options.import) + " -o FIELD.vdb`");
+  if (!imported && options.viewed.copy.empty()) options.viewed.copy = default_copy(options.viewed.file);
+  if (!imported) require_same_folder(options.viewed);
+  options.viewed.command = command_of(options);
   options.server.token = token_of_user();
   options.server.page = page_folder();
 
@@ -94,7 +114,8 @@ int main(int argc, char** argv) {
   Progress& progress = progress_until_interrupted();
   ViewOptions options;
   CLI::App app("Look at a scene in a browser and change it there: the picture follows", "tensorray view");
-  app.add_option("SCENE", options.viewed.file, "Scene (.json) or field (.vdb)")->required();
+  app.add_option("SCENE", options.files, "Scene (.json), field (.vdb), or files that `tensorray import` reads")
+      ->required();
   app.add_option("--set", options.viewed.overrides, "KEY=VALUE: change a value of the scene")->allow_extra_args(false);
   app.add_option("--save-scene", options.viewed.copy,
                  "The file to which the page may save its scene (NAME.view.json beside the scene)");
@@ -105,6 +126,7 @@ int main(int argc, char** argv) {
   app.add_option("--host", options.server.hosts, "A further name by which browsers may call this machine")
       ->allow_extra_args(false);
   app.add_option("--threads", options.threads, "Number of threads (all)")->check(CLI::Range(1, 4096));
+  add_import_options(app, options.import);
   app.add_flag("-q,--quiet", options.quiet, "Print only the address");
   return run_and_report([&] {
     try {

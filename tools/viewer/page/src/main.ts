@@ -109,7 +109,7 @@ function on_hello(message: Hello): void {
   hello = message;
   by_id("file-name").textContent = message.file;
   by_id("file-name").title = `${message.file}, ${message.field.voxels.join(" × ")} voxels, tensorray ${message.version}`;
-  by_id("save").title = "Write the scene to " + message.saves;
+  by_id("save").title = message.saves ? "Write the scene to " + message.saves : "Only of a field that stays";
   document.title = message.file.replace(/^.*\//, "") + " – tensorray";
   on_field(message.field);
   if (again) {
@@ -205,7 +205,7 @@ by_id("space-rays").addEventListener("click", (event) => {
 by_id("save").addEventListener("click", () => ask_and_tell({ type: "save", scene: state.scene }));
 by_id("copy-command").addEventListener("click", () => {
   if (!hello) return;
-  const text = command_line(hello.file, state.patch());
+  const text = command_line(hello.command, state.patch());
   by_id("copy-command").dataset["command"] = text;
   void copy(text).then((done) => show_toast(done ? "Copied: " + text : text));
 });

@@ -26,9 +26,7 @@ function assignments(patch: JsonObject, prefix: string): string[] {
   });
 }
 
-/** @param patch  From the scene of `file` to the present one. */
-export function command_line(file: string, patch: JsonObject): string {
-  // A value that begins with a dash would be an option.
-  const scene = quoted(file.startsWith("-") ? "./" + file : file);
-  return ["tensorray render " + scene, ...assignments(patch, "").map((text) => "--set " + quoted(text))].join(" ");
+/** @param command  Renders the original scene. @param patch  From that to the present one. */
+export function command_line(command: string[], patch: JsonObject): string {
+  return [...command.map(quoted), ...assignments(patch, "").map((text) => "--set " + quoted(text))].join(" ");
 }

@@ -27,6 +27,8 @@ export interface Hello {
   file: string;
   /** Where "save" writes. */
   saves: string;
+  /** The program and its arguments that render the scene. */
+  command: string[];
   field: FieldInformation;
 }
 
