@@ -48,10 +48,11 @@ constexpr double max_negative = 0.2;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, order, frame, cells = "linear";
+  std::string array, gradient_of, strain_of, order, frame, cells = "linear", error;
   std::vector<int> resolution;
   std::vector<double> voxel_size, bounds, origin;
-  double thickness = 0;
+  double thickness = 0, finest = 0;
+  int levels = 0;
   std::filesystem::path output, boundary;
   std::string name, units, steps = "last";
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
@@ -66,6 +67,16 @@ std::optional<Value> named(const std::string& name, const std::vector<std::pair<
   return {};
 }
 
+/// A part as 1% or 0.01. @throw std::invalid_argument
+double part_of(const std::string& text) {
+  double value = 0;
+  const bool is_percent = !text.empty() && text.back() == '%';
+  if (!CLI::detail::lexical_cast(is_percent ? text.substr(0, text.size() - 1) : text, value) || !(value >= 0) ||
+      !(value *= is_percent ? 0.01 : 1.0, value <= 1))
+    throw std::invalid_argument("--error " + escaped(text) + ": give a part of the peak, as 1% or 0.01");
+  return value;
+}
+
 ImportSettings settings_of(const ImportOptions& options) {
   ImportSettings settings = options.settings;
   settings.array = options.array + options.gradient_of + options.strain_of;  // They exclude each other.
@@ -78,6 +89,11 @@ ImportSettings settings_of(const ImportOptions& options) {
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
   if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
+  if (options.levels > 0) settings.sampling.levels = options.levels;
+  if (options.finest > 0) settings.sampling.finest = options.finest;
+  if (!options.error.empty()) settings.sampling.error = part_of(options.error);
+  if (options.finest > 0 && options.voxel_size.size() == 1 && options.finest > options.voxel_size[0])
+    throw std::invalid_argument("--finest must not be larger than --voxel-size, which is the coarsest");
   if (options.thickness > 0) settings.thickness = options.thickness;
   if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
   if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
@@ -114,6 +130,9 @@ void print_sampling(const ImportReport& report) {
                         mesh.voxel.z(), mesh.active));
   tell_made(fmt::format("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}",
                         mesh.native_peak, mesh.sampled_peak, mesh.native_median, mesh.sampled_median));
+  for (std::size_t i = 0; i < mesh.finer.size(); ++i)
+    tell_made(fmt::format("  level {}: voxels of {:.4g} in {} bricks; {} active", i + 1, mesh.finer[i].voxel,
+                          mesh.finer[i].bricks, mesh.finer[i].active));
   if (mesh.overlaid > 0)
     tell_made(fmt::format("  {} voxels lie in several blocks, which overlap: the smallest cell counts", mesh.overlaid));
   if (mesh.non_finite > 0)
@@ -321,6 +340,22 @@ void add_where(CLI::App& command, ImportOptions& options) {
       .add_option("--thickness", options.thickness,
                   "Thickness of the slab that a flat mesh becomes (default: a typical edge of its cells)")
       ->check(positive);
+  command
+      .add_option("--levels", options.levels,
+                  "At most so many sizes of voxels, of which each is half of the one before, as fine as the cells of "
+                  "the mesh ask (default: 4)")
+      ->check(CLI::Range(1, max_levels));
+  command
+      .add_option("--finest", options.finest,
+                  "The least edge of a voxel (default: what the levels reach); without --voxel-size, which is the "
+                  "coarsest, the levels are counted from it")
+      ->check(positive)
+      ->excludes(resolution);
+  command
+      .add_option("--error", options.error,
+                  "Refine where voxels differ from the mesh by more than this part of its peak, as 1%; 0: wherever "
+                  "cells are smaller than voxels")
+      ->option_text("PART");
   command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6);
 }
 

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <bitset>
 #include <cmath>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include <vtkDataSet.h>
 
 #include "tools/import/meshes/mesh_cell.h"
+#include "tools/import/sampling/block_places.h"
 #include "tools/import/sampling/cell_parts.h"
 #include "tools/import/sampling/sampling_lattice.h"
 #include "tools/import/sampling/voxel_average.h"
@@ -25,22 +27,11 @@ using Eigen::Vector3i;
 using Tensor = VoxelAverage::Tensor;
 using Voxels = std::bitset<TensorBlock::voxels>;
 
-/// For each block of the lattice, the cells that may have voxels in it, by ascending index: the cells of block b are
+/// For each block that is sampled, the cells that may have voxels in it, by ascending index: the cells of block b are
 /// cells[first[b]] to cells[first[b + 1] − 1].
 struct Bins {
-  Vector3i blocks = Vector3i::Zero();
   std::vector<std::size_t> first;
   std::vector<vtkIdType> cells;
-
-  std::size_t index(int x, int y, int z) const {
-    return (static_cast<std::size_t>(x) * static_cast<std::size_t>(blocks.y()) + static_cast<std::size_t>(y)) *
-               static_cast<std::size_t>(blocks.z()) +
-           static_cast<std::size_t>(z);
-  }
-  Vector3i block(std::size_t index) const {
-    const auto ny = static_cast<std::size_t>(blocks.y()), nz = static_cast<std::size_t>(blocks.z());
-    return {static_cast<int>(index / nz / ny), static_cast<int>(index / nz % ny), static_cast<int>(index % nz)};
-  }
 };
 
 /// Indices of the voxels whose centres may be in a box, or no farther than `margin` from it; empty if there are none.
@@ -56,29 +47,41 @@ AlignedBox3i voxels_in(const AlignedBox3d& box, const SamplingLattice& lattice, 
   return {from.cast<int>().matrix(), to.cast<int>().matrix()};
 }
 
-/// Calls `visit(block)` with the index of each block that has voxels among `voxels`.
+/// Calls `visit(block)` with the number of each block that has voxels among `voxels`.
 template <class Visit>
-void for_each_block(const Bins& bins, const AlignedBox3i& voxels, const Visit& visit) {
+void for_each_block(const BlockPlaces& places, const AlignedBox3i& voxels, const Visit& visit) {
   if (voxels.isEmpty()) return;
   const Vector3i from = voxels.min() / TensorBlock::size, to = voxels.max() / TensorBlock::size;
   for (int x = from.x(); x <= to.x(); ++x)
     for (int y = from.y(); y <= to.y(); ++y)
-      for (int z = from.z(); z <= to.z(); ++z) visit(bins.index(x, y, z));
+      for (int z = from.z(); z <= to.z(); ++z)
+        if (const std::optional<std::size_t> block = places.number(x, y, z)) visit(*block);
 }
 
-Bins bins_of(const Solid& solid, const SamplingLattice& lattice, const Vector3d& margin) {
+Bins bins_of(const Solid& solid, const SamplingLattice& lattice, const BlockPlaces& places, const Vector3d& margin) {
   Bins bins;
-  bins.blocks = (lattice.size.array() + (TensorBlock::size - 1)) / TensorBlock::size;
-  bins.first.assign(bins.index(bins.blocks.x(), 0, 0) + 1, 0);
+  bins.first.assign(places.count() + 1, 0);
   for (const AlignedBox3d& box : solid.boxes)
-    for_each_block(bins, voxels_in(box, lattice, margin), [&](std::size_t block) { ++bins.first[block + 1]; });
+    for_each_block(places, voxels_in(box, lattice, margin), [&](std::size_t block) { ++bins.first[block + 1]; });
   for (std::size_t block = 1; block < bins.first.size(); ++block) bins.first[block] += bins.first[block - 1];
   bins.cells.resize(bins.first.back());
   std::vector<std::size_t> next(bins.first.begin(), bins.first.end() - 1);
   for (std::size_t id = 0; id < solid.boxes.size(); ++id)
-    for_each_block(bins, voxels_in(solid.boxes[id], lattice, margin),
+    for_each_block(places, voxels_in(solid.boxes[id], lattice, margin),
                    [&](std::size_t block) { bins.cells[next[block]++] = static_cast<vtkIdType>(id); });
   return bins;
+}
+
+/// The numbers of the blocks with cells, ordered by origin.
+std::vector<std::size_t> used_blocks(const Bins& bins, const BlockPlaces& places) {
+  std::vector<std::size_t> used;
+  for (std::size_t block = 0; block + 1 < bins.first.size(); ++block)
+    if (bins.first[block] < bins.first[block + 1]) used.push_back(block);
+  std::sort(used.begin(), used.end(), [&](std::size_t a, std::size_t b) {
+    const Vector3i of_a = places.place(a), of_b = places.place(b);
+    return std::lexicographical_compare(of_a.begin(), of_a.end(), of_b.begin(), of_b.end());
+  });
+  return used;
 }
 
 /// The tensor of `cell`, whose weights are those at a position; not finite if a point with a weight has no finite
@@ -298,11 +301,10 @@ Vector3d margin_of(const MeshSource& source) {
 
 }  // namespace
 
-TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress, std::size_t& overlaid) {
-  Bins bins = bins_of(source.solid, source.lattice, margin_of(source));
-  std::vector<std::size_t> used;
-  for (std::size_t block = 0; block + 1 < bins.first.size(); ++block)
-    if (bins.first[block] < bins.first[block + 1]) used.push_back(block);
+TensorBlocks mesh_blocks(const MeshSource& source, const BlockPlaces& places, const Progress& progress,
+                         std::size_t& overlaid) {
+  Bins bins = bins_of(source.solid, source.lattice, places, margin_of(source));
+  const std::vector<std::size_t> used = used_blocks(bins, places);
   TensorBlocks blocks = make_blocks(used.size());
   const std::thread::id caller = std::this_thread::get_id();
   std::atomic<std::uint64_t> done{0};
@@ -319,7 +321,7 @@ TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress, std
       vtkIdType* const begin = bins.cells.data() + bins.first[used[i]];
       vtkIdType* const end = bins.cells.data() + bins.first[used[i] + 1];
       if (source.layers) std::sort(begin, end, is_finer);
-      blocks[i].origin = TensorBlock::size * bins.block(used[i]);
+      blocks[i].origin = TensorBlock::size * places.place(used[i]);
       in_layers += fill_centres(source, begin, end, work, blocks[i]);
       if (blocks[i].active.any()) average_voxels(source, begin, end, work, blocks[i]);
     }
