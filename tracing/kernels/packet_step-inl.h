@@ -312,8 +312,7 @@ HWY_INLINE void end_step(const PacketMedium& medium, Packet& packet, const Compo
     const F3 error = load(step.error, i);
     const F squares = hn::Mul(dot(error, error), squared_voxels_per_unit(medium, packet, i));
     const F time = hn::Div(load(packet.time, i), set(medium.unit));
-    const F excess = hn::Mul(hn::Mul(time, hn::Sqrt(squares)), set(1 / medium.settings.tolerance));
-    store(medium.levels ? hn::Mul(excess, load(packet.finest, i)) : excess, packet.excess, i);
+    store(hn::Mul(hn::Mul(time, hn::Sqrt(squares)), set(1 / medium.settings.tolerance)), packet.excess, i);
   }
 }
 

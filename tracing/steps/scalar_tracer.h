@@ -374,7 +374,7 @@ class Tracer {
     using namespace step_lengths;
     const double finer = std::max(1.0, leaf_scale(field_, next.position()) / scale_);
     const double excess =
-        std::max(finer * error.position().norm() / voxel_, error.direction().norm()) / settings_.tolerance;
+        std::max(error.position().norm() / (scale_ * voxel_), error.direction().norm()) / settings_.tolerance;
     const double order = is_composed() ? composed_order : runge_kutta(settings_.method)->order;
     const double factor =
         (is_composed() ? composed_safety : safety) * std::pow(std::max(excess, min_excess), -1 / order);
