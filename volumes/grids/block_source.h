@@ -37,6 +37,10 @@ struct BlockSource {
 /// Empties `block`, and fills it with block i of `source`.
 void read_block(const BlockSource& source, std::size_t i, TensorBlock& block);
 
+/// The same from the shape of block i and what fills it (BlockSource::fill).
+void read_block(const BlockShape& shape, const std::function<void(std::size_t, TensorBlock&)>& fill, std::size_t i,
+                TensorBlock& block);
+
 /// A dense grid: `value(index)` at every index of `box` (inclusive), all active. `value` may be called from several
 /// threads at once.
 BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
