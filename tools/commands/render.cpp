@@ -220,6 +220,8 @@ void add_render_command(CLI::App& program, Progress& progress) {
   for (const auto& [flag, meaning] : {std::pair("--order", "Of the tensor's components, as for `tensorray import`"),
                                       std::pair("--array", "The array that is the tensor, likewise"),
                                       std::pair("--gradient-of", "The velocity whose gradient it is, likewise"),
+                                      std::pair("--voxel-size", "The largest edge of a voxel, likewise"),
+                                      std::pair("--levels", "Most sizes of voxels, likewise"),
                                       std::pair("--frame", "The axes of the components, likewise")})
     command->add_option(flag, options->import[flag], meaning)->group("Import");
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");

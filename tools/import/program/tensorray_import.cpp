@@ -35,6 +35,8 @@
 #include "tools/import/import_file.h"
 #include "tools/import/program/child_process.h"
 #include "tools/import/vtk_formats/vtp_files.h"
+#include "volumes/bricks/brick_layout.h"
+#include "volumes/bricks/tensor_field.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/grids/page_memory.h"
 
@@ -130,9 +132,6 @@ void print_sampling(const ImportReport& report) {
                         mesh.voxel.z(), mesh.active));
   tell_made(fmt::format("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}",
                         mesh.native_peak, mesh.sampled_peak, mesh.native_median, mesh.sampled_median));
-  for (std::size_t i = 0; i < mesh.finer.size(); ++i)
-    tell_made(fmt::format("  level {}: voxels of {:.4g} in {} bricks; {} active", i + 1, mesh.finer[i].voxel,
-                          mesh.finer[i].bricks, mesh.finer[i].active));
   if (mesh.overlaid > 0)
     tell_made(fmt::format("  {} voxels lie in several blocks, which overlap: the smallest cell counts", mesh.overlaid));
   if (mesh.non_finite > 0)
@@ -145,14 +144,31 @@ void print_sampling(const ImportReport& report) {
          false);
 }
 
-void print_surface(const BodySurface& surface, const TriangleMesh& triangles) {
+/// Of a field of several levels. @param blocks  Of all levels.
+void print_levels(const SamplingReport& mesh, std::size_t blocks, bool is_symmetric) {
+  for (std::size_t i = 0; i < mesh.finer.size(); ++i)
+    tell_made(fmt::format("  level {}: voxels of {:.4g} in {} refined bricks of level {}; {} active", i + 1,
+                          mesh.finer[i].voxel, mesh.finer[i].bricks, i, mesh.finer[i].active));
+  const double floats = CubicBrick::stored_floats(is_symmetric ? TensorBrick::symmetric : TensorBrick::general);
+  if (!mesh.finer.empty())
+    tell_made(
+        fmt::format("  refined where voxels differ from the mesh by more than {:.3g}% of its peak (--error); {} "
+                    "in memory",
+                    100 * mesh.wanted_error, bytes_text(static_cast<double>(blocks) * floats * sizeof(float))));
+  if (mesh.is_too_large)
+    tell_made("  the next level is left out, as it would have too many voxels; --voxel-size or --finest lets it be");
+}
+
+void print_surface(const BodySurface& surface, const TriangleMesh& triangles, double voxels) {
   const std::string inner =
       surface.inner_faces > 0 ? fmt::format("; {} inner faces left out", surface.inner_faces) : "";
   if (surface.open_edges > 0)
     tell_made(fmt::format("  surface: none, as the cells' faces leave {} edges open{}", surface.open_edges, inner));
   else
-    tell_made(fmt::format("  surface: {} triangles, volume {:.6g}{}{}", triangles.triangles.size(), triangles.volume(),
-                          surface.area > 0 ? fmt::format(", area {:.6g}", surface.area) : "", inner));
+    tell_made(fmt::format("  surface: {} triangles, volume {:.6g}{}, filled by voxels to {:.1f}%{}",
+                          triangles.triangles.size(), triangles.volume(),
+                          surface.area > 0 ? fmt::format(", area {:.6g}", surface.area) : "",
+                          100 * voxels / triangles.volume(), inner));
 }
 
 /// Progress as a line of phase, done and total, for a program that has started this one.
@@ -173,6 +189,9 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
   if (!options.units.empty()) grid.metadata["tensorray:units"] = options.units;
   progress.update("writing", 0, 1);
   const std::string name = grid.name;
+  const bool is_symmetric = asymmetry(grid) < symmetric_tolerance;
+  std::size_t blocks = 0;
+  for (const TensorBlocks* level : levels_of(grid)) blocks += level->size();
   const Eigen::Vector3i size = grid.active_box().sizes() + Eigen::Vector3i::Ones();
   output.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, grid, options.half); });
   bar.reset();
@@ -184,7 +203,8 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
     tell_made(fmt::format("  a flat mesh: a slab of one voxel, {:.4g} thick{}", report.thickness,
                           settings.thickness ? "" : " (--thickness)"));
   if (report.mesh) print_sampling(report);
-  if (report.surface) print_surface(*report.surface, grid.surface);
+  if (report.mesh) print_levels(*report.mesh, blocks, is_symmetric);
+  if (report.surface) print_surface(*report.surface, grid.surface, report.mesh->volume);
   for (const std::string& note : report.notes) tell_made(fmt::format("  {}", escaped(note)));
   for (const std::string& warning : report.warnings) tell({"tensorray: warning: " + warning}, false);
   if (report.boundary_triangles > 0)
@@ -369,7 +389,7 @@ void add_import_options(CLI::App& program, Progress& progress) {
   program.option_defaults()->group(usual_group);
   program
       .add_option("FILE", options->settings.files,
-                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .pvd .vtkhdf), XDMF (.xdmf .xmf), "
+                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .vth .pvd .vtkhdf), XDMF (.xdmf .xmf), "
                   "EnSight (.case), ExodusII (.ex2 .exo .e .g), CGNS "
                   "(.cgns), an OpenFOAM "
                   "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), MetaImage (.mha "

@@ -2,6 +2,7 @@
 /// @file tools/import/sampling/block_places.h
 /// The blocks of a lattice that are sampled.
 
+#include <bitset>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -11,6 +12,9 @@
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
+
+/// Voxels of a block.
+using VoxelSet = std::bitset<TensorBlock::voxels>;
 
 /// Numbers the blocks of a lattice: all, or the eight in each refined brick of the level before.
 class BlockPlaces {

@@ -79,7 +79,19 @@ void report_native(const MeshSource& source, const AlignedBox3d& bounds, Samplin
   std::tie(report.native_peak, report.native_median) = peak_and_median(norms);
 }
 
-/// The voxels of the finest level at each place, of which norms are taken.
+/// Voxels at the ends of the lattice count by half along an axis, as they are on the faces of what is sampled.
+double volume_of(const TensorBlocks& blocks, const SamplingReport& report) {
+  double voxels = 0;
+  for (const TensorBlock& block : blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[static_cast<std::size_t>(offset)]) continue;
+      const Eigen::Array3i index = block.origin + TensorBlock::position(offset), last = report.size.array() - 1;
+      voxels += std::pow(0.5, ((index == 0 || index == last) && last > 0).count());
+    }
+  return voxels * report.voxel.prod();
+}
+
+/// Peak and median are those of level 0; where a finer level has a greater norm, that is the peak.
 void report_sampled(const TensorGrid& grid, SamplingReport& report) {
   Norms norms;
   const auto add = [&](const TensorBlocks& blocks) {
@@ -89,6 +101,7 @@ void report_sampled(const TensorGrid& grid, SamplingReport& report) {
   };
   add(grid.blocks);
   report.active = norms.size();
+  report.volume = volume_of(grid.blocks, report);
   std::tie(report.sampled_peak, report.sampled_median) = peak_and_median(norms);
   norms.clear();
   for (const TensorBlocks& blocks : grid.finer) add(blocks);
@@ -98,14 +111,6 @@ void report_sampled(const TensorGrid& grid, SamplingReport& report) {
 MeshSource on_lattice(const MeshSource& source, const SamplingLattice& lattice) {
   return {source.mesh, source.point_tensors, source.cell_tensors, source.solid,
           lattice,     source.layers,        source.tolerance};
-}
-
-/// Removes blocks without active voxels.
-TensorBlocks filled_blocks(TensorBlocks blocks) {
-  TensorGrid grid;
-  grid.blocks = std::move(blocks);
-  remove_empty_blocks(grid);
-  return std::move(grid.blocks);
 }
 
 /// A level is refined where cells are smaller than its voxels and it differs from the mesh. Voxels whose size the user
@@ -127,7 +132,8 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
       return;
     const MeshSource source = on_lattice(coarsest, lattice);
     const TensorBlocks& blocks = level == 1 ? grid.blocks : grid.finer.back();
-    const std::vector<bool> refined = bricks_to_refine({source, places, blocks}, sizes, error * report.native_peak);
+    const auto missed = missed_cells({source, places, blocks}, sizes, error * report.native_peak);
+    const std::vector<bool> refined = bricks_to_refine(lattice, places, missed);
     const auto count = static_cast<std::size_t>(std::count(refined.begin(), refined.end(), true));
     if (count == 0) return;
     bricks += count;
@@ -137,7 +143,9 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
     places = BlockPlaces(half.size, places, refined);
     lattice = half;
     std::size_t overlaid = 0;
-    TensorBlocks filled = filled_blocks(mesh_blocks(on_lattice(coarsest, lattice), places, progress, overlaid));
+    TensorBlocks filled =
+        mesh_blocks(on_lattice(coarsest, lattice), places, voxels_about(lattice, places, missed), progress, overlaid);
+    remove_empty_blocks(filled);
     if (filled.empty()) return;
     grid.finer.push_back(std::move(filled));
     LevelReport& of_level = report.finer.emplace_back();
@@ -162,7 +170,8 @@ TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const
                           tolerance};
   TensorGrid grid;
   grid.to_world = Eigen::Translation3d(lattice.origin) * Eigen::Scaling(lattice.voxel);
-  grid.blocks = filled_blocks(mesh_blocks(source, BlockPlaces(lattice.size), progress, report.overlaid));
+  grid.blocks = mesh_blocks(source, BlockPlaces(lattice.size), {}, progress, report.overlaid);
+  remove_empty_blocks(grid.blocks);
   report.size = lattice.size;
   report.voxel = lattice.voxel;
   report_native(source, sampled_box(solid, settings), report);

@@ -16,9 +16,6 @@ class vtkDataSet;
 
 namespace tensorray {
 
-/// Of a field.
-constexpr int max_levels = 4;
-
 struct SamplingSettings {
   /// The number of voxels along the longest edge (int), the numbers along x, y, z (>= 2 each), or the edge of a voxel
   /// (double). If none is given, a voxel is about as large as the median cell, and fits between the two sides of a thin
@@ -46,8 +43,8 @@ struct SamplingReport {
   double sampled_peak = 0, sampled_median = 0;  ///< ‖T‖ at the active voxels.
   std::size_t overlaid = 0;                     ///< Voxels that lie in several blocks, which overlap.
   std::vector<LevelReport> finer;               ///< Levels from 1 on.
-  double kept_volume = 1;                       ///< The voxels' volume, as a part of the mesh's in `bounds`.
-  double wanted_error = 0;                      ///< At the mesh's points; 0: none was.
+  double volume = 0;                            ///< Of the active voxels of level 0, world units.
+  double wanted_error = 0;                      ///< That was given or chosen.
   bool is_too_large = false;                    ///< Whether a level is left out, as it would have too many voxels.
   std::size_t non_finite = 0;                   ///< Of those cells or points: whose tensor is not finite.
 };

@@ -26,8 +26,19 @@ using IdRange = tbb::blocked_range<vtkIdType>;
 /// Voxels that are larger than cells by less are as fine.
 const double as_fine = std::sqrt(2.0);
 
-/// What a point or a cell becomes where voxels are compared with the mesh: enough for a detail that ends there.
-constexpr double margin = 2;  // Voxels.
+/// How far voxels reach beyond a cell: those of the next level by half as much, so that there are bricks for the
+/// B-splines of them all.
+constexpr double margin = 2;
+
+/// The voxels within a box and `beside` voxels around it.
+Eigen::AlignedBox3i indices_of(const SamplingLattice& lattice, const Eigen::AlignedBox3d& box, double beside) {
+  const Eigen::Array3d last = (lattice.size.array() - 1).cast<double>();
+  const auto index_of = [&](const Vector3d& x, double offset) {
+    const Eigen::Array3d at = (x - lattice.origin).cwiseQuotient(lattice.voxel).array() + offset;
+    return Vector3i(at.round().max(0).min(last).cast<int>());
+  };
+  return {index_of(box.min(), -beside), index_of(box.max(), beside)};
+}
 
 std::array<double, 4> lagrange(double t) {
   return {-t * (t - 1) * (t - 2) / 6, (t + 1) * (t - 1) * (t - 2) / 2, -(t + 1) * t * (t - 2) / 2,
@@ -160,35 +171,50 @@ std::vector<float> cell_sizes(const MeshSource& source) {
   return sums;
 }
 
-std::vector<bool> bricks_to_refine(const SampledLevel& level, const std::vector<float>& sizes, double tolerance) {
+std::vector<Eigen::AlignedBox3d> missed_cells(const SampledLevel& level, const std::vector<float>& sizes,
+                                              double tolerance) {
   const MeshSource& source = level.source;
-  const SamplingLattice& lattice = source.lattice;
   const std::vector<char> misses = find_misses(level, sizes, tolerance);
-  std::vector<bool> refined(level.places.count(), false);
-  const Eigen::Array3i last = level.places.extent().array() - 1;
+  const auto is_missed = [&](vtkIdType i) { return misses[static_cast<std::size_t>(i)] != 0; };
+  std::vector<Eigen::AlignedBox3d> missed;
   vtkNew<vtkIdList> ids;
   for (std::size_t cell = 0; cell < source.solid.boxes.size(); ++cell) {
     const Eigen::AlignedBox3d& box = source.solid.boxes[cell];
     if (box.isEmpty()) continue;
-    bool is_missed = !source.point_tensors && misses[cell];
-    if (source.point_tensors) {
-      source.mesh.GetCellPoints(static_cast<vtkIdType>(cell), ids);
-      is_missed = std::any_of(ids->begin(), ids->end(),
-                              [&](vtkIdType id) { return misses[static_cast<std::size_t>(id)] != 0; });
-    }
-    if (!is_missed) continue;
-    const auto brick_of = [&](const Vector3d& x, double beside) {
-      const Eigen::Array3d at = (x - lattice.origin).cwiseQuotient(lattice.voxel).array() + beside;
-      return Vector3i((at / TensorBlock::size).floor().max(-1).min(last.cast<double>() + 1).cast<int>());
-    };
-    const Vector3i from = brick_of(box.min(), -margin).cwiseMax(0);
-    const Vector3i to = brick_of(box.max(), margin).cwiseMin(last.matrix());
+    const auto id = static_cast<vtkIdType>(cell);
+    if (source.point_tensors) source.mesh.GetCellPoints(id, ids);
+    if (source.point_tensors ? std::any_of(ids->begin(), ids->end(), is_missed) : is_missed(id)) missed.push_back(box);
+  }
+  return missed;
+}
+
+std::vector<bool> bricks_to_refine(const SamplingLattice& lattice, const BlockPlaces& places,
+                                   const std::vector<Eigen::AlignedBox3d>& missed) {
+  std::vector<bool> refined(places.count(), false);
+  const Vector3i last = places.extent() - Vector3i::Ones();
+  for (const Eigen::AlignedBox3d& box : missed) {
+    const Eigen::AlignedBox3i voxels = indices_of(lattice, box, margin);
+    const Vector3i from = voxels.min() / TensorBlock::size, to = (voxels.max() / TensorBlock::size).cwiseMin(last);
     for (int x = from.x(); x <= to.x(); ++x)
       for (int y = from.y(); y <= to.y(); ++y)
         for (int z = from.z(); z <= to.z(); ++z)
-          if (const std::optional<std::size_t> number = level.places.number(x, y, z)) refined[*number] = true;
+          if (const std::optional<std::size_t> number = places.number(x, y, z)) refined[*number] = true;
   }
   return refined;
+}
+
+std::vector<VoxelSet> voxels_about(const SamplingLattice& lattice, const BlockPlaces& places,
+                                   const std::vector<Eigen::AlignedBox3d>& missed) {
+  std::vector<VoxelSet> wanted(places.count());
+  for (const Eigen::AlignedBox3d& box : missed) {
+    const Eigen::AlignedBox3i voxels = indices_of(lattice, box, margin);
+    for (int x = voxels.min().x(); x <= voxels.max().x(); ++x)
+      for (int y = voxels.min().y(); y <= voxels.max().y(); ++y)
+        for (int z = voxels.min().z(); z <= voxels.max().z(); ++z)
+          if (const std::optional<std::size_t> number = places.number(x / 8, y / 8, z / 8))
+            wanted[*number].set(static_cast<std::size_t>(TensorBlock::offset(x % 8, y % 8, z % 8)));
+  }
+  return wanted;
 }
 
 }  // namespace tensorray
