@@ -39,6 +39,7 @@ GridSettings choose_grid(const Generator& generator, const GridRequest& request)
   GridSettings grid = default_grid(generator, std::max(longest, 2));  // With one voxel the box would have no extent.
   if (request.min) grid.min = *request.min;
   if (request.max) grid.max = *request.max;
+  grid.levels = request.levels;
   if (each) {
     grid.resolution = *each;
   } else if (request.min || request.max || longest == 1) {

@@ -143,7 +143,9 @@ void SectionReader::generator(const char* key, std::optional<GenerateDescription
   inner.finish();
   try {
     member->grid = choose_grid(member->generator, grid);
-    generate(member->generator, default_grid(member->generator, 4));  // Checks the ranges of the parameters.
+    GridSettings small = default_grid(member->generator, 4);
+    small.levels = grid.levels;
+    generate(member->generator, small);  // Checks the ranges of the parameters.
   } catch (const std::invalid_argument& error) {
     source_.fail(fmt::format("`{}`: {}", pointer_to(key), error.what()));
   }

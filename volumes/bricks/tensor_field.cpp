@@ -110,7 +110,7 @@ bool place_blocks(const LevelPlan& level, const Coefficients& field, double& nor
 void check_levels(const BlockSource& source, const Eigen::AlignedBox3i& voxels, const Interpolant& interpolant) {
   if (source.finer.empty()) return;
   if (interpolant.between != Interpolation::cubic)
-    throw std::invalid_argument("a field of several levels needs cubic interpolation");
+    throw std::invalid_argument("the tensor field has several levels, which need \"interpolation\": \"cubic\"");
   if (source.finer.size() >= max_levels) throw std::invalid_argument("the tensor field has more than 4 levels");
   constexpr int farthest = 1 << 27;  // Indices of the finest level are integers.
   if (voxels.min().minCoeff() < -farthest || voxels.max().maxCoeff() > farthest)

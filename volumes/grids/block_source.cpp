@@ -1,5 +1,7 @@
 #include "volumes/grids/block_source.h"
 
+#include <array>
+#include <map>
 #include <memory>
 #include <utility>
 
@@ -58,6 +60,21 @@ BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& 
   source.shapes = dense_shapes(box);
   source.fill = [value](std::size_t, TensorBlock& block) { fill_block(block, value); };
   return source;
+}
+
+std::vector<BlockShape> shapes_within(const std::vector<Eigen::Vector3i>& bricks, const Eigen::AlignedBox3i& extent) {
+  std::map<std::array<int, 3>, std::bitset<TensorBlock::voxels>> found;
+  for (const Eigen::Vector3i& brick : bricks) {
+    Eigen::AlignedBox3i box(2 * size * brick, (2 * size * brick).array() + 2 * size);  // With its last faces.
+    for (int axis = 0; axis < 3; ++axis)
+      if (box.max()[axis] != extent.max()[axis]) --box.max()[axis];
+    box = box.intersection(extent);
+    for (const BlockShape& shape : dense_shapes(box))
+      found[{shape.origin.x(), shape.origin.y(), shape.origin.z()}] |= shape.active;
+  }
+  std::vector<BlockShape> shapes;
+  for (const auto& [origin, active] : found) shapes.push_back({{origin[0], origin[1], origin[2]}, active});
+  return shapes;
 }
 
 BlockSource view_of(const TensorGrid& grid) {

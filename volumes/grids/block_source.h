@@ -46,6 +46,10 @@ void read_block(const BlockShape& shape, const std::function<void(std::size_t, T
 BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
                          const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value);
 
+/// The blocks of a finer level in some bricks of the level before: all voxels there, also on the extent's last faces.
+/// @param extent  Of the level's voxels.
+std::vector<BlockShape> shapes_within(const std::vector<Eigen::Vector3i>& bricks, const Eigen::AlignedBox3i& extent);
+
 /// The blocks of a grid, which must outlive them; or which they keep in memory.
 BlockSource view_of(const TensorGrid& grid);
 BlockSource source_of(TensorGrid grid);

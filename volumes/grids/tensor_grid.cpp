@@ -52,6 +52,10 @@ Eigen::AlignedBox3i active_box(const std::vector<BlockShape>& shapes) {
   return box;
 }
 
+Eigen::Affine3d to_world_of_level(const Eigen::Affine3d& to_world, int level) {
+  return to_world * Eigen::Scaling(std::ldexp(1.0, -level));
+}
+
 std::vector<BlockShape> shapes_of(const TensorBlocks& blocks) {
   std::vector<BlockShape> result(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {

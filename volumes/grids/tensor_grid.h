@@ -59,6 +59,9 @@ using TensorBlocks = std::deque<TensorBlock, SlotAllocator<TensorBlock>>;
 TensorBlocks make_blocks(std::size_t count);
 TensorBlocks unset_blocks(std::size_t count);
 
+/// From voxel indices of a level to world. @param to_world  Of level 0.
+Eigen::Affine3d to_world_of_level(const Eigen::Affine3d& to_world, int level);
+
 std::vector<BlockShape> shapes_of(const TensorBlocks& blocks);  ///< In their order.
 
 /// A sparse grid of tensors. Plain data; voxel (i, j, k) has its centre at `to_world` * (i, j, k).
