@@ -132,7 +132,8 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
       return;
     const MeshSource source = on_lattice(coarsest, lattice);
     const TensorBlocks& blocks = level == 1 ? grid.blocks : grid.finer.back();
-    const auto missed = missed_cells({source, places, blocks}, sizes, error * report.native_peak);
+    const double tolerance = error * report.native_peak * std::pow(2, level - 1);
+    const auto missed = missed_cells({source, places, blocks}, sizes, tolerance);
     const std::vector<bool> refined = bricks_to_refine(lattice, places, missed);
     const auto count = static_cast<std::size_t>(std::count(refined.begin(), refined.end(), true));
     if (count == 0) return;

@@ -33,11 +33,10 @@ constexpr double margin = 2;
 /// The voxels within a box and `beside` voxels around it.
 Eigen::AlignedBox3i indices_of(const SamplingLattice& lattice, const Eigen::AlignedBox3d& box, double beside) {
   const Eigen::Array3d last = (lattice.size.array() - 1).cast<double>();
-  const auto index_of = [&](const Vector3d& x, double offset) {
-    const Eigen::Array3d at = (x - lattice.origin).cwiseQuotient(lattice.voxel).array() + offset;
-    return Vector3i(at.round().max(0).min(last).cast<int>());
+  const auto at = [&](const Vector3d& x, double offset) {
+    return Eigen::Array3d((x - lattice.origin).cwiseQuotient(lattice.voxel).array() + offset).max(0).min(last).eval();
   };
-  return {index_of(box.min(), -beside), index_of(box.max(), beside)};
+  return {at(box.min(), -beside).floor().cast<int>().matrix(), at(box.max(), beside).ceil().cast<int>().matrix()};
 }
 
 std::array<double, 4> lagrange(double t) {

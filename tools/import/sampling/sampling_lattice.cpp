@@ -81,14 +81,20 @@ double edge_by_volume(const Solid& solid, const AlignedBox3d& bounds) {
   return 0;
 }
 
-/// How many times `voxel` is doubled for level 0: while that is no larger than the large cells, and fits in the box.
+/// The voxels of level 0: twice as large, and so on, while that is no larger than the large cells, and fits in the box.
 double doubled(double voxel, const Solid& solid, const AlignedBox3d& box, const SamplingSettings& settings) {
-  double large =
-      is_adaptive(solid) ? *std::max_element(solid.edges.begin(), solid.edges.end()) : edge_by_volume(solid, box);
+  double large = edge_by_volume(solid, box);
   for (int axis = 0; axis < 3; ++axis)
     if (axis != settings.flat_axis) large = std::min(large, box.sizes()[axis]);
   for (int level = 1; level < settings.levels.value_or(max_levels) && 2 * voxel <= rounded_size * large; ++level)
     voxel *= 2;
+  return voxel;
+}
+
+/// Of adaptive refinement: the voxels of level 0 are the largest cells, if these are not too many.
+double largest_cell(const Solid& solid, const AlignedBox3d& box) {
+  double voxel = *std::max_element(solid.edges.begin(), solid.edges.end());
+  while (!is_small(voxels_along(box.sizes(), voxel))) voxel *= 2;
   return voxel;
 }
 
@@ -192,8 +198,11 @@ SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const Sam
     lattice.voxel.setConstant(voxel);
   };
   std::visit(Overloaded{[&](std::monostate) {
-                          const double least = settings.finest ? *settings.finest : chosen_voxel(mesh, solid, box);
-                          set_voxel(std::min(doubled(least, solid, box, settings), longest));
+                          const bool is_amr = !settings.finest && settings.levels != 1 && is_adaptive(solid);
+                          const double least = settings.finest ? *settings.finest
+                                               : is_amr        ? largest_cell(solid, box)
+                                                               : chosen_voxel(mesh, solid, box);
+                          set_voxel(std::min(is_amr ? least : doubled(least, solid, box, settings), longest));
                         },
                         [&](int count) {
                           require_two(count);
