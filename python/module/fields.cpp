@@ -142,7 +142,7 @@ py::array dense_array(const Blocks& blocks, const Eigen::AlignedBox3i& box, Shap
   return taken(std::move(values), shape);
 }
 
-/// The tensors over the box of the active voxels, and the transform of its indices (x, y, z) to the world.
+/// The tensors of level 0 over the box of the active voxels, and the transform of its indices (x, y, z) to the world.
 py::tuple tensors_of(const Field& field) {
   TensorGrid grid;
   run(py::none(), 0, [&](const Progress&) { grid = field.grid(); });
@@ -154,26 +154,36 @@ py::tuple tensors_of(const Field& field) {
   return py::make_tuple(tensors, rows_first(to_world.matrix()), grid.name, grid.metadata);
 }
 
+void copy_blocks(TensorBlocks& blocks, Archive& archive) {
+  std::size_t count = blocks.size();
+  archive.copy(count);
+  if (archive.reads()) {
+    archive.require(count, block_floats * sizeof(float));
+    blocks = make_blocks(count);
+  }
+  for (TensorBlock& block : blocks) {
+    archive.copy(block.origin.data(), sizeof block.origin);
+    archive.copy(block.active);
+    archive.copy(block.values.front().data(), block_floats * sizeof(float));
+  }
+}
+
 /// All that a grid holds, to or from the bytes that another process gets.
 void copy_grid(TensorGrid& grid, Archive& archive) {
   std::string metadata = Json(grid.metadata).dump();
-  std::size_t count = grid.blocks.size();
+  std::size_t finer = grid.finer.size();
   archive.copy_list(grid.name);
   archive.copy(grid.to_world.data(), sizeof grid.to_world.matrix());
   archive.copy_list(metadata);
   archive.copy_list(grid.surface.vertices);
   archive.copy_list(grid.surface.triangles);
-  archive.copy(count);
+  archive.copy(finer);
   if (archive.reads()) {
     grid.metadata = parse_value(metadata).get<std::map<std::string, std::string>>();
-    archive.require(count, block_floats * sizeof(float));
-    grid.blocks = make_blocks(count);
+    archive.require(finer, sizeof(std::size_t));
+    grid.finer.resize(finer);
   }
-  for (TensorBlock& block : grid.blocks) {
-    archive.copy(block.origin.data(), sizeof block.origin);
-    archive.copy(block.active);
-    archive.copy(block.values.front().data(), block_floats * sizeof(float));
-  }
+  for (TensorBlocks* blocks : levels_of(grid)) copy_blocks(*blocks, archive);
 }
 
 py::bytes voxels_of(const Field& field) {

@@ -162,6 +162,7 @@ def make(kind: str, resolution: int | Sequence[int] | None = None, *, min: Array
 def import_file(*files: Path, array: str | None = None, gradient_of: str | None = None, strain_of: str | None = None,
                 cells: str | None = None, order: str | None = None, frame: str | None = None,
                 resolution: int | Sequence[int] | None = None, voxel_size: float | Sequence[float] | None = None,
+                levels: int | None = None, finest: float | None = None, error: float | str | None = None,
                 origin: Sequence[float] | None = None, bounds: Sequence[float] | None = None,
                 thickness: float | None = None, step: int | str | None = None, boundary: Path | None = None,
                 name: str | None = None, units: str | None = None, progress: Progress = None) -> Field:
@@ -177,7 +178,10 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
     order        Order of six components: vtk, fsl, mrtrix, voigt or lower; of four of a plane: plane or 2x2.
     frame        Axes of the components in a medical image: ras, lps, voxels or fsl; default: those of the order.
     resolution   Voxels along the longest edge, or along x, y and z; default: the median cell is a voxel.
-    voxel_size   Edge of a voxel, world units; of .npy also three, along x, y and z.
+    voxel_size   Edge of a voxel, of the coarsest level, world units; of .npy also three, along x, y and z.
+    levels       At most so many sizes of voxels, each half of the one before, as the mesh's cells ask: 1 to 4 (4).
+    finest       The least edge of a voxel; without voxel_size, the levels are counted from it.
+    error        Refine where voxels differ from the mesh by more than this part of its peak: 0.01, "1%".
     origin       World (x, y, z) of the centre of the first voxel of a .npy file; default: (0, 0, 0).
     bounds       Crop: (xmin, xmax, ymin, ymax, zmin, zmax).
     thickness    Thickness of the slab that a flat mesh becomes; default: a typical edge of its cells.
@@ -195,7 +199,7 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
         raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
     options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--cells": cells,
                "--order": order, "--frame": frame, "--resolution": resolution, "--voxel-size": voxel_size,
-               "--origin": origin, "--bounds": bounds, "--thickness": thickness, "--steps": step,
+               "--levels": levels, "--finest": finest, "--error": error, "--origin": origin, "--bounds": bounds, "--thickness": thickness, "--steps": step,
                "--boundary": boundary, "--name": name, "--units": units}
     with tempfile.TemporaryDirectory() as folder:
         vdb = os.path.join(folder, "field.vdb")

@@ -31,6 +31,7 @@ struct GridRequest {
   /// Voxels along the longest axis of the box (voxels are then cubes); or voxels along x, y and z.
   std::variant<int, Eigen::Vector3i> resolution = 64;
   std::optional<Eigen::Vector3d> min, max;  ///< Centres of the outermost voxels, world; none: the generator's.
+  int levels = 1;                           ///< As GridSettings::levels.
 };
 
 constexpr int resolution_limit = 32768;       ///< Voxels along an axis.
@@ -44,6 +45,8 @@ void describe(GridRequest& grid, Visitor& visit) {
         between(1, resolution_limit));
   visit("min", grid.min, "least corner of the box, world; default: that of the kind");
   visit("max", grid.max, "greatest corner of the box, world; default: that of the kind");
+  visit("levels", grid.levels, "of a point load: levels of voxels, each half as large, that are near the load",
+        between(1, max_levels));
 }
 
 /// @throw std::invalid_argument that names the key: max below min, no voxel, too many voxels.

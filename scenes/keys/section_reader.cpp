@@ -159,7 +159,9 @@ void SectionReader::generator(const char* key, std::optional<GenerateDescription
   inner.finish();
   try {
     member->grid = choose_grid(member->generator, grid);
-    generate(member->generator, default_grid(member->generator, 4));  // Checks the ranges of the parameters.
+    GridSettings small = default_grid(member->generator, 4);
+    small.levels = grid.levels;
+    generate(member->generator, small);  // Checks the ranges of the parameters.
   } catch (const std::invalid_argument& error) {
     source_.fail(fmt::format("`{}`: {}", pointer_to(key), error.what()));
   }
@@ -285,6 +287,7 @@ GridSettings choose_grid(const Generator& generator, const GridRequest& request)
   GridSettings grid = default_grid(generator, std::max(longest, 2));  // With one voxel the box would have no extent.
   if (request.min) grid.min = *request.min;
   if (request.max) grid.max = *request.max;
+  grid.levels = request.levels;
   if (each)
     grid.resolution = *each;
   else if (request.min || request.max || longest == 1)

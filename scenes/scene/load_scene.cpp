@@ -323,8 +323,10 @@ LoadedField with_notes(MadeField made, const std::string& source) {
                                 made.non_finite, made.voxels + made.non_finite));
   if (!made.field) throw std::runtime_error(source + ": no voxel of the field is finite; nothing can be traced");
   const EigenvalueReport& eigenvalues = made.eigenvalues;
-  notes.push_back(fmt::format("field: {}, {} voxels, eigenvalues {}, {}", source, made.voxels,
-                              choice_name(eigenvalues.chosen), between_voxels(made)));
+  std::string voxels = fmt::format("{} voxels", made.voxels);
+  if (!made.finer_voxels.empty()) voxels += fmt::format(", and in finer levels {}", fmt::join(made.finer_voxels, ", "));
+  notes.push_back(fmt::format("field: {}, {}, eigenvalues {}, {}", source, voxels, choice_name(eigenvalues.chosen),
+                              between_voxels(made)));
   if (const double beyond = made.field->surface_beyond(); beyond > 0)
     notes.push_back(fmt::format(
         "warning: {}: the surface of the field's body reaches {:.2g} voxels beyond the field; light is straight there; "

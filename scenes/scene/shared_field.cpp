@@ -31,8 +31,13 @@ struct FieldRest {
     archive.copy(parts.voxels.min());
     archive.copy(parts.voxels.max());
     archive.copy(parts.max_norm);
-    archive.copy_list(parts.bricks);
-    archive.copy_list(parts.strongest);
+    std::size_t levels = parts.levels.size();
+    archive.copy(levels);
+    parts.levels.resize(levels);
+    for (BrickList& level : parts.levels) {
+      archive.copy_list(level.places);
+      archive.copy_list(level.strongest);
+    }
     archive.copy_list(parts.surface.vertices);
     archive.copy_list(parts.surface.triangles);
     archive.copy(stride);
@@ -70,8 +75,7 @@ bool complete_file(const LoadedField& loaded) {
   rest.parts.to_world = field.to_world();
   rest.parts.voxels = field.voxels().cast<int>();
   rest.parts.max_norm = field.max_norm();
-  rest.parts.bricks = field.bricks();
-  for (const Eigen::Vector3i& brick : field.bricks()) rest.parts.strongest.push_back(field.brick(brick).strongest);
+  rest.parts.levels = field.bricks_of_levels();
   rest.parts.surface = field.surface();
   rest.stride = memory.stride;
   rest.components = memory.components;
@@ -98,7 +102,9 @@ std::optional<LoadedField> field_of_file(Descriptor file) {
   Archive archive(bytes);
   FieldRest rest;
   rest.copy(archive);
-  rest.parts.memory = bricks_of_file(std::move(file), rest.parts.bricks.size(), rest.stride, rest.components);
+  std::size_t count = 0;
+  for (const BrickList& level : rest.parts.levels) count += level.places.size();
+  rest.parts.memory = bricks_of_file(std::move(file), count, rest.stride, rest.components);
   rest.notes.emplace_back("the field is that of another process, which has loaded it");
   return LoadedField{TensorField(std::move(rest.parts)), rest.eigenvalues, rest.non_finite, std::move(rest.notes)};
 }

@@ -77,6 +77,23 @@ inline Ray trace_one(const TensorField& field, const Geometry& geometry, const B
   return {batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]};
 }
 
+/// A ray through a formula, by the classical Runge–Kutta method with steps far below what tests measure.
+inline Ray through_formula(const TensorFunction& T, double s, Eigen::Vector3d P, Eigen::Vector3d V, double length) {
+  constexpr int steps = 4000;
+  const double h = length / steps;
+  const auto bend = [&](const Eigen::Vector3d& at, const Eigen::Vector3d& v) {
+    const Eigen::Vector3d Tv = T(at) * v;
+    return Eigen::Vector3d(s * (Tv - v.dot(Tv) / v.squaredNorm() * v));
+  };
+  for (int i = 0; i < steps; ++i) {
+    const Eigen::Vector3d k1 = bend(P, V), v2 = V + h / 2 * k1, k2 = bend(P + h / 2 * V, v2), v3 = V + h / 2 * k2,
+                          k3 = bend(P + h / 2 * v2, v3), v4 = V + h * k3, k4 = bend(P + h * v3, v4);
+    P += h / 6 * (V + 2 * v2 + 2 * v3 + v4);
+    V = (V + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)).normalized();
+  }
+  return {P, V};
+}
+
 /// All points of a ray.
 inline PathPoints points_of(const TensorField& field, const RayRecord& record) {
   PathPoints points;

@@ -1,6 +1,6 @@
 /// @file tools/benchmark/rays.cpp
 /// Rays a second of one thread: a loop that a user of OpenVDB's BoxSampler would write, and `trace`, which
-/// has cubic fields and steps of order four.
+/// has cubic fields and steps of order four, also with the same voxels as a second level.
 
 #include <array>
 #include <map>
@@ -46,9 +46,29 @@ const std::vector<Case>& cases() {
 struct Rays {
   TensorGrid grid;
   Geometry geometry;
-  TensorField linear, cubic;
+  TensorField linear, cubic, levels;
   std::vector<RayBatch> batches;
 };
+
+/// The voxels as level 1, refined everywhere, and every second one of them along each axis as level 0.
+TensorGrid two_levels(const TensorGrid& grid) {
+  std::map<std::array<int, 3>, TensorBlock> coarse;  // In the order of their origins.
+  for (const TensorBlock& block : grid.blocks)
+    for (int i = 0; i < TensorBlock::voxels; ++i) {
+      const Eigen::Vector3i fine = block.origin + TensorBlock::position(i), index = fine / 2;
+      if (!block.active[i] || fine != 2 * index) continue;
+      const Eigen::Vector3i at = index.unaryExpr([](int v) { return v & 7; }), origin = index - at;
+      TensorBlock& to = coarse[{origin.x(), origin.y(), origin.z()}];
+      to.origin = origin;
+      to.active.set(TensorBlock::offset(at.x(), at.y(), at.z()));
+      to.values[TensorBlock::offset(at.x(), at.y(), at.z())] = block.values[i];
+    }
+  TensorGrid result;
+  result.to_world = grid.to_world * Eigen::Scaling(2.0);
+  for (const auto& [origin, block] : coarse) result.blocks.push_back(block);
+  result.finer.push_back(grid.blocks);
+  return result;
+}
 
 std::vector<RayBatch> make_batches(const Case& test, const TensorField& field) {
   constexpr int packets_of_batch = 16;
@@ -79,12 +99,13 @@ const Rays& rays_of(const Case& test) {
     TensorGrid grid = generate(test.generator, default_grid(test.generator, resolution));
     for (TensorBlock& block : grid.blocks)
       for (Eigen::Matrix3f& value : block.values) value *= static_cast<float>(test.scale);
-    TensorField linear(grid), cubic(grid, Interpolant{Interpolation::cubic, Border::fade});
+    const Interpolant spline{Interpolation::cubic, Border::fade};
+    TensorField linear(grid), cubic(grid, spline), levels(two_levels(grid), spline);
     Surfaces surfaces;
     surfaces.bounds = box_mesh(linear.index_bounds(), linear.to_world());
     std::vector<RayBatch> batches = make_batches(test, linear);
     rays.reset(new Rays{std::move(grid), Geometry(std::move(surfaces)), std::move(linear), std::move(cubic),
-                        std::move(batches)});
+                        std::move(levels), std::move(batches)});
   }
   return *rays;
 }
@@ -178,6 +199,10 @@ void add_rays() {
     add("default", [&test](benchmark::State& state) {
       const Rays& rays = rays_of(test);
       measure(state, rays, [&](RayBatch& batch) { trace(rays.cubic, rays.geometry, BendingSettings(), batch); });
+    });
+    add("levels", [&test](benchmark::State& state) {
+      const Rays& rays = rays_of(test);
+      measure(state, rays, [&](RayBatch& batch) { trace(rays.levels, rays.geometry, BendingSettings(), batch); });
     });
   }
 }

@@ -47,7 +47,8 @@ void add_import_options(CLI::App& command, ImportChoices& choices) {
                                       std::pair("--array", "The array that is the tensor, likewise"),
                                       std::pair("--gradient-of", "The velocity whose gradient it is, likewise"),
                                       std::pair("--frame", "The axes of the components, likewise"),
-                                      std::pair("--voxel-size", "Edge of a voxel, likewise"),
+                                      std::pair("--voxel-size", "The largest edge of a voxel, likewise"),
+                                      std::pair("--levels", "Most sizes of voxels, likewise"),
                                       std::pair("--resolution", "Voxels along the longest edge, likewise")})
     command.add_option(flag, choices[flag], meaning)->group("Import");
 }

@@ -69,6 +69,10 @@ void derive(const DeriveOptions& options, const Progress& progress) {
   if (removed > 0)
     tell({fmt::format("warning: {}: {} voxels are not finite and are left out", options.input.string(), removed)},
          false);
+  if (!field.finer.empty())
+    tell({fmt::format("{}: the field has {} levels; the grids are of level 0", options.input.string(),
+                      field.finer.size() + 1)},
+         false);
   std::vector<std::string> names;
   for (const ScalarGrid& grid : grids) names.push_back(grid.name);
   tell_made(fmt::format("{}: {} of field \"{}\", {} voxels, {}", options.output.string(), joined(names), field.name,

@@ -11,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "base/text/path_text.h"
@@ -103,6 +104,7 @@ Json to_json(const FieldInfo& field) {
   json["world_extent"] = box_to_json(s.world_box);
   json["voxel_size"] = to_json(s.voxel_size);
   json["active_voxels"] = s.active_voxels;
+  if (s.voxels_of_levels.size() > 1) json["voxels_of_levels"] = s.voxels_of_levels;
   json["non_finite_voxels"] = s.non_finite;
   json["memory_bytes"] = s.memory_bytes;
   json["norm"] = norm;
@@ -163,6 +165,8 @@ void print_grid(const FieldInfo& field) {
   print_row("extent, world", box_text(s.world_box));
   print_row("voxel size", text(s.voxel_size));
   print_row("active voxels", fmt::format("{}", s.active_voxels));
+  if (s.voxels_of_levels.size() > 1)
+    print_row("voxels by level", fmt::format("{}", fmt::join(s.voxels_of_levels, ", ")));
   print_row("not finite", fmt::format("{}", s.non_finite));
   print_row("memory", bytes_text(static_cast<double>(s.memory_bytes)));
   if (!field.surface.triangles.empty())

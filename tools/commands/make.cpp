@@ -115,6 +115,12 @@ void add_grid_flags(CLI::App& command, GridRequest& grid) {
         ->check(finite)
         ->group("Grid");
   };
+  if (command.get_name() == "point_load" || command.get_name() == "two_point_load")
+    command
+        .add_option("--levels", grid.levels, "Levels of voxels, each half as large as those before, towards the load")
+        ->check(CLI::Range(1, max_levels))
+        ->default_str("1")
+        ->group("Grid");
   add_corner("--min", grid.min, "Least corner of the box, world", standard.min);
   add_corner("--max", grid.max, "Greatest corner of the box, world", standard.max);
 }

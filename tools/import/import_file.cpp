@@ -102,6 +102,8 @@ void warn_of_same(const TensorGrid& grid, ImportReport& report) {
 }
 
 TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings, ImportReport& report) {
+  if (settings.sampling.levels.value_or(1) > 1 || settings.sampling.finest || settings.sampling.error)
+    throw std::invalid_argument("has voxels of one size, which are kept: leave --levels, --finest and --error out");
   if (!settings.boundary.empty()) throw std::invalid_argument("has voxels, which have no body: leave --boundary out");
   if (settings.take == Take::tensor && !settings.array.empty() && lattice.array.empty())
     throw std::invalid_argument("has one array, which has no name: leave --array out");
@@ -127,9 +129,11 @@ struct SilentVtk {
 /// Gives the grid the surface of the mesh, within the bounds that the user gives.
 void add_surface(vtkDataSet& mesh, const ImportSettings& settings, const Progress& progress, TensorGrid& grid,
                  ImportReport& report) {
-  constexpr double tolerance = 0.0025;  // Of a voxel.
+  constexpr double tolerance = 0.0025;  // Of a voxel, of the finest level.
+  const SamplingReport& sampled = *report.mesh;
+  const double voxel = sampled.finer.empty() ? sampled.voxel.minCoeff() : sampled.finer.back().voxel;
   progress.update("finding the surface", 0, 1);
-  report.surface = body_surface(mesh, tolerance * report.mesh->voxel.minCoeff());
+  report.surface = body_surface(mesh, tolerance * voxel);
   TriangleMesh triangles = std::move(report.surface->mesh);
   if (report.surface->open_edges > 0) return;
   grid.surface = std::move(triangles);

@@ -25,7 +25,7 @@ constexpr double margin = 1.0 / 8;  // Extension of the plate on each side, in s
 
 // The first quads are of the lesser of these two sizes, for the usual tolerance.
 constexpr double first_pixels = 8;       // In pixels of straight light.
-constexpr double first_voxels = 1;       // In voxels, so that no part of the field is missed; ...
+constexpr double first_voxels = 1;       // In voxels of the finest level, so that no part of the field is missed; ...
 constexpr double max_for_voxels = 64;    // ... but voxels ask for no more quads than this along a side.
 constexpr double usual_tolerance = 0.5;  // Pixels.
 
@@ -52,7 +52,8 @@ double pixel_of_starts(const Plate& plate, const Beam& beam) {
 double first_size(const TensorField& field, const Beam& beam, double pixel, const FlowSettings& settings) {
   const Eigen::Vector2d extent = box_of(beam.aperture).sizes();
   const double voxel =
-      start_ratio(beam, field.world_box().center()) * field.to_world().linear().colwise().norm().minCoeff();
+      std::ldexp(start_ratio(beam, field.world_box().center()) * field.to_world().linear().colwise().norm().minCoeff(),
+                 1 - field.levels());
   const double for_voxels = std::max(first_voxels * voxel, extent.maxCoeff() / max_for_voxels);
   const double usual = std::min(first_pixels * pixel, for_voxels);
   const double least = std::sqrt(16 * extent.prod() / static_cast<double>(settings.max_starts));

@@ -16,6 +16,7 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
   const Eigen::Matrix3d to_world = field.to_world().linear();
   adaptive = settings.step == 0;
   bounded = std::isfinite(settings.max_length);
+  levels = field.levels() > 1;
   unit = static_cast<float>(std::exp2(std::round(std::log2(to_world.col(0).norm()))));
   longest_step = adaptive ? static_cast<float>(step_lengths::longest_composed) : settings.step;
   // No voxel is longer along any direction. (The norm is not less than the greatest singular value.)
@@ -53,9 +54,9 @@ namespace {
 /// The step of a lane, in index space: positions from its brick's first voxel, directions per unit of `time`.
 struct LaneStep {
   Eigen::Vector3d from, from_direction, to, to_direction, origin;
-  double time, turn;
+  double time, turn, scale;
 
-  LaneStep(const Packet& packet, int lane) : time(packet.time[lane]) {
+  LaneStep(const Packet& packet, int lane) : time(packet.time[lane]), scale(packet.scale[lane]) {
     Eigen::Vector3d turned;
     for (int axis = 0; axis < 3; ++axis) {
       from[axis] = packet.now.p[axis][lane];
@@ -68,7 +69,7 @@ struct LaneStep {
     turn = turned.norm();
   }
 
-  double voxels() const { return time * from_direction.norm(); }
+  double voxels() const { return scale * time * from_direction.norm(); }
 
   /// A box around the path, of the control points of its Bézier curve, with a margin for rounding.
   Eigen::AlignedBox3d bounds() const {

@@ -3,6 +3,8 @@
 /// What the kernel's code for all instruction sets shares: the field, a packet of rays, and what only few rays need,
 /// which is computed one by one in double precision.
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -24,8 +26,9 @@ struct PacketMedium {
   const Composition& method;
   bool adaptive;       // Whether the error sets the lengths of steps.
   bool bounded;        // Whether the limit of length may end rays within the field.
+  bool levels;         // Whether the field has finer levels than level 0.
   float unit;          // A power of two near a voxel's edge, world units: squares of lengths in it are not extreme.
-  float longest_step;  // Voxels; steps through straight bricks may be longer.
+  float longest_step;  // Voxels of the leaf; steps through straight bricks may be longer.
   float longest_kick;  // Longest part of a step that a kick takes, world units.
   float to_index[3][3];
   std::int32_t first[3], last[3];            // First and last voxels of the extent.
@@ -34,6 +37,9 @@ struct PacketMedium {
   float slope[3];   // 0 along axes with a single voxel, 1 along the others.
 
   TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
+  LeafBrick leaf(const std::int32_t at[3], const std::array<float, 3>& position) const {
+    return field.leaf({at[0], at[1], at[2]}, position);
+  }
   /// Whether a step from a brick may meet a surface.
   bool near_surface(const std::int32_t at[3]) const {
     bool near = true;
@@ -66,28 +72,33 @@ struct alignas(64) RayState {
 
 /// Rays side by side, one in each lane. All lanes of its vectors hold a ray, so that no step needs a mask: a lane whose
 /// ray has ended repeats another ray.
+///
+/// Positions are in voxels of level 0, from the first voxel of a brick of level 0, whatever the leaf is in which a ray
+/// was sampled last.
 struct alignas(64) Packet {
   RayState now, next;         // Before and after the step that is being taken.
   PerRay kick;                // σ.
   PerRay length;              // Length of the path since the ray entered the packet, world units.
-  PerRay wanted;              // The next step, voxels.
-  PerRay reach;               // Upper bound of ‖σ h T‖ in the brick.
-  PerRay strongest;           // TensorBrick::strongest of the brick.
+  PerRay wanted;              // The next step, voxels of level 0, before it is limited by the leaf.
+  PerRay reach;               // Upper bound of ‖σ h T‖ in the leaf.
+  PerRay strongest;           // TensorBrick::strongest of the leaf.
   PerRay low[3], high[3];     // Box of the voxels, relative to the brick.
   PerRay last[3];             // Last cell, relative to the brick.
   PerRay log_radiance_scale;  // Λ since the ray entered the packet; not of rays with differentials.
+  PerRay first[3], scale;     // LeafBrick::first and scale.
 
   // The step that is being taken:
   PerRay time;            // Its length, world units.
   PerRay sample[3];       // Positions of the samples.
-  PerRay voxel;           // Number, in the brick, of the first coefficient that the sample needs.
+  PerRay voxel;           // Number, in the leaf, of the first coefficient that the sample needs.
   PerRay fraction[3];     // Position within the cell.
   PerRay tensor[8];       // Stored components of the tensors (see TensorBrick), component after component.
   PerRay change_of_step;  // Λ of this step.
   PerRay excess;          // Of adaptive steps: the error divided by the tolerance.
-  PerRay slopes[3][8];    // Of the tensors along x, y and z; only for rays with differentials.
+  PerRay finest;          // The greatest scale of a leaf that was sampled; only if the field has levels.
+  PerRay slopes[3][8];    // Of the tensors along x, y and z, per voxel of the leaf; only for rays with differentials.
 
-  const float* bending[packet_rays] = {};  // Of the bricks.
+  const float* bending[packet_rays] = {};  // Of the leaves.
   alignas(64) std::int32_t brick[3][packet_rays];
   std::int32_t ray[packet_rays];
   std::uint32_t alive = 0;  // One bit for each lane.
@@ -96,7 +107,10 @@ struct alignas(64) Packet {
   std::uint32_t steps = 0, step_limit = 0;
   float max_reach = 0;
   bool near_surface = false;
-  bool straight = false;  // Whether a lane's brick bends nothing.
+  bool straight = false;  // Whether a lane's leaf bends nothing.
+  bool refined = false;   // Whether a lane's leaf is finer than level 0.
+
+  Packet() { std::fill_n(scale, packet_rays, 1.0f); }
 };
 
 /// A kick that is too strong for a series in single precision: its direction, zero if there is none, and its Λ.

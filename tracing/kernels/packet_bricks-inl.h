@@ -1,14 +1,22 @@
 /// @file tracing/kernels/packet_bricks-inl.h
 /// The bricks of a packet's lanes, and their sample points in these bricks.
 
-/// The brick of a lane. It is not compared with that of the lane before: where rays part, this costs more than it
-/// saves.
-HWY_INLINE TensorBrick brick_of(const PacketMedium& medium, const Packet& packet, int lane) {
+/// The leaf of a lane, at any of its points. It is not compared with that of the lane before: where rays part, this
+/// costs more than it saves.
+HWY_INLINE LeafBrick leaf_of(const PacketMedium& medium, const Packet& packet, int lane) {
   const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
-  return medium.brick(at);
+  if (HWY_LIKELY(!medium.levels)) return {medium.brick(at)};
+  return medium.leaf(at, {packet.first[0][lane], packet.first[1][lane], packet.first[2][lane]});
 }
 
-/// Finds the bricks of some lanes. `wanted` has one bit for each lane; other lanes of their vectors keep their bricks.
+/// Sets the places of a vector's leaves to those of whole bricks of level 0.
+HWY_INLINE void set_places(Packet& packet, int at) {
+  store(zeros(), packet.first, at);
+  store(set(1), packet.scale, at);
+}
+
+/// Finds the leaves of some lanes, at the points `first`. `wanted` has one bit for each lane; other lanes of their
+/// vectors keep their leaves.
 HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t wanted) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     std::uint32_t rest = bits_of_vector(wanted, i);
@@ -17,16 +25,22 @@ HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uin
       return hn::Eq(hn::Load(ints, packet.brick[axis] + i), hn::Set(ints, packet.brick[axis][i]));
     };
     if (hn::AllTrue(ints, hn::And(same(0), hn::And(same(1), same(2))))) {
-      const TensorBrick brick = brick_of(medium, packet, i);
-      std::fill_n(packet.bending + i, lanes, brick.bending);
-      store(set(brick.strongest), packet.strongest, i);
-      continue;
+      const LeafBrick leaf = leaf_of(medium, packet, i);
+      if (leaf.scale == 1) {
+        std::fill_n(packet.bending + i, lanes, leaf.brick.bending);
+        store(set(leaf.brick.strongest), packet.strongest, i);
+        if (medium.levels) set_places(packet, i);
+        continue;
+      }
     }
     for (; rest != 0; rest &= rest - 1) {
       const int lane = i + static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
-      const TensorBrick brick = brick_of(medium, packet, lane);
-      packet.bending[lane] = brick.bending;
-      packet.strongest[lane] = brick.strongest;
+      const LeafBrick leaf = leaf_of(medium, packet, lane);
+      packet.bending[lane] = leaf.brick.bending;
+      packet.strongest[lane] = leaf.brick.strongest;
+      if (!medium.levels) continue;
+      for (std::size_t axis = 0; axis < 3; ++axis) packet.first[axis][lane] = leaf.first[axis];
+      packet.scale[lane] = leaf.scale;
     }
   }
 }
@@ -35,10 +49,16 @@ HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uin
 HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
   const F most = set(1e30f), longest = set(medium.longest_kick);
   F greatest = hn::Zero(floats);
-  packet.straight = false;
+  packet.straight = packet.refined = false;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F strongest = load(packet.strongest, i);
-    const F reach = hn::Mul(hn::Mul(hn::Abs(load(packet.kick, i)), longest), strongest);
+    F reach = hn::Mul(hn::Mul(hn::Abs(load(packet.kick, i)), longest), strongest);
+    if (medium.levels) {
+      const F scale = load(packet.scale, i);
+      packet.refined |= !hn::AllTrue(floats, hn::Eq(scale, set(1)));
+      // Adaptive steps that reach into a finer leaf are repeated if they are too long for it.
+      if (medium.adaptive) reach = hn::Div(reach, scale);
+    }
     store(reach, packet.reach, i);
     greatest = hn::Max(greatest, hn::IfThenElse(hn::Le(reach, most), reach, most));  // NaN counts as strong.
     packet.straight |= !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
@@ -77,8 +97,8 @@ static HWY_NOINLINE void begin(const PacketMedium& medium, Packet& packet) {
   summarize(medium, packet);
 }
 
-/// Moves the lanes whose point is outside their brick to the brick of the point. `point(i)` gives the points of the
-/// vector at lane i, relative to the lanes' bricks. `which` has the bits of lanes that may move.
+/// Moves the lanes whose point is outside their brick to the brick of the point, and to its leaf. `point(i)` gives the
+/// points of the vector at lane i, relative to the lanes' bricks. `which` has the bits of lanes that may move.
 template <class Point>
 HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t which, const Point& point) {
   const F zero = hn::Zero(floats), cells = set(TensorBrick::cells);
@@ -86,7 +106,7 @@ HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, std::
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     if (bits_of_vector(which, i) == 0) continue;
     // The cell between the last two voxels is the last one, also for points on its far face.
-    const F3 cell = minimum(floor(point(i)), load(packet.last, i));
+    const F3 at = point(i), cell = minimum(floor(at), load(packet.last, i));
     const auto away = [](F to) HWY_ATTR { return hn::Floor(hn::Mul(to, set(1.0f / TensorBrick::cells))); };
     const F bricks[3] = {away(cell.x), away(cell.y), away(cell.z)};
     const Mask moves = hn::Or(hn::Ne(bricks[0], zero), hn::Or(hn::Ne(bricks[1], zero), hn::Ne(bricks[2], zero)));
@@ -96,16 +116,37 @@ HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, std::
       std::int32_t* const brick = packet.brick[axis] + i;
       hn::Store(hn::Add(hn::Load(ints, brick), hn::ConvertTo(ints, bricks[axis])), ints, brick);
     }
+    if (HWY_LIKELY(!medium.levels)) continue;
+    alignas(64) PerRay points[3];
+    for (int axis = 0; axis < 3; ++axis)
+      store(hn::NegMulAdd(bricks[axis], cells, axis == 0 ? at.x : axis == 1 ? at.y : at.z), points[axis], i);
+    for_lanes(bits_of_vector(which, i) << i, [&](int lane) {
+      for (int axis = 0; axis < 3; ++axis) packet.first[axis][lane] = points[axis][lane];
+    });
   }
-  find_bricks(medium, packet, moved);
+  find_bricks(medium, packet, medium.levels ? which : moved);
   summarize(medium, packet);
+}
+
+/// A point as seen from the lanes' leaves, in their voxels.
+HWY_INLINE F3 in_leaf(const Packet& packet, const F3& point, int at) {
+  const F scale = load(packet.scale, at);
+  const F3 from = sub(point, load(packet.first, at));
+  return {hn::Mul(scale, from.x), hn::Mul(scale, from.y), hn::Mul(scale, from.z)};
+}
+
+/// The first and the last cell of the extent, as seen from the lanes' leaves.
+HWY_INLINE void find_cells_of_extent(const Packet& packet, int at, F3& first, F3& last) {
+  first = in_leaf(packet, load(packet.low, at), at);
+  const F3 high = sub(in_leaf(packet, load(packet.high, at), at), {set(1), set(1), set(1)});
+  last = {hn::Max(high.x, first.x), hn::Max(high.y, first.y), hn::Max(high.z, first.z)};
 }
 
 /// Finds the sample points (`point_of(i)` gives those of the vector at lane i) and their cells. Points outside the
 /// extent are moved to it: the tensor there is that of the nearest point.
-/// @param moved  Bits of lanes; only their vectors are found again, and points outside their bricks count as on the
-///               faces of the bricks. 0: all vectors.
-/// @return bits of the lanes whose points are not within their bricks.
+/// @param moved  Bits of lanes; only their vectors are found again, and points outside their leaves count as on the
+///               faces of the leaves. 0: all vectors.
+/// @return bits of the lanes whose points are not within their leaves.
 template <class Point>
 HWY_INLINE std::uint32_t find_cells(Packet& packet, std::uint32_t moved, const Point& point_of) {
   const F last = set(CubicBrick::cells - 1), width = set(CubicBrick::width);
@@ -115,7 +156,12 @@ HWY_INLINE std::uint32_t find_cells(Packet& packet, std::uint32_t moved, const P
     F3 point = point_of(i);
     store(point, packet.sample, i);
     point = clamp(point, load(packet.low, i), load(packet.high, i));
-    F3 near = clamp(floor(point), load(packet.low, i), load(packet.last, i));
+    F3 first_cell = load(packet.low, i), last_cell = load(packet.last, i);
+    if (HWY_UNLIKELY(packet.refined)) {
+      point = in_leaf(packet, point, i);
+      find_cells_of_extent(packet, i, first_cell, last_cell);
+    }
+    F3 near = clamp(floor(point), first_cell, last_cell);
     // As unsigned integers, negative floats are the greatest.
     const auto greatest =
         hn::Max(hn::BitCast(bits, near.x), hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
@@ -127,7 +173,7 @@ HWY_INLINE std::uint32_t find_cells(Packet& packet, std::uint32_t moved, const P
   return beyond;
 }
 
-/// Finds the sample points, and moves lanes to the bricks of these points.
+/// Finds the sample points, and moves lanes to the leaves of these points.
 template <class Point>
 HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& point_of) {
   const std::uint32_t beyond = find_cells(packet, 0, point_of);

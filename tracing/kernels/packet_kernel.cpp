@@ -74,6 +74,7 @@ class Kernel {
       packet.now.p[axis][lane] = ray.place.position[axis];
       packet.now.v[axis][lane] = ray.direction[axis];
       packet.brick[axis][lane] = ray.place.brick[axis];
+      packet.first[axis][lane] = ray.place.position[axis];
       if constexpr (differentials)
         for (int i = 0; i < 2; ++i) {
           packet.now.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis] * medium_.unit;
@@ -88,7 +89,10 @@ class Kernel {
   /// Copies a ray, without the values that depend on its brick (see `begin`).
   static void copy_lane(const Packet& from, int of, Packet& to, int lane) {
     copy_state<differentials>(from.now, of, to.now, lane);
-    for (int axis = 0; axis < 3; ++axis) to.brick[axis][lane] = from.brick[axis][of];
+    for (int axis = 0; axis < 3; ++axis) {
+      to.brick[axis][lane] = from.brick[axis][of];
+      to.first[axis][lane] = from.first[axis][of];
+    }
     to.kick[lane] = from.kick[of];
     to.length[lane] = from.length[of];
     to.log_radiance_scale[lane] = from.log_radiance_scale[of];

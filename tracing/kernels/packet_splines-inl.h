@@ -212,6 +212,9 @@ HWY_INLINE bool in_one_cell(const Packet& packet, int at) {
   Mask same = hn::Eq(load(packet.voxel, at), set(packet.voxel[at]));
   for (const auto& brick : packet.brick)
     same = hn::And(same, hn::RebindMask(floats, hn::Eq(hn::Load(ints, brick + at), hn::Set(ints, brick[at]))));
+  for (int axis = 0; packet.refined && axis < 3; ++axis)
+    same = hn::And(same, hn::Eq(load(packet.first[axis], at), set(packet.first[axis][at])));
+  if (packet.refined) same = hn::And(same, hn::Eq(load(packet.scale, at), set(packet.scale[at])));
   return hn::AllTrue(floats, same);
 }
 

@@ -22,7 +22,7 @@ HWY_INLINE F squared_voxels_per_unit(const PacketMedium& medium, const Packet& p
   return dot(u, u);
 }
 
-/// Length of a voxel along the rays, world units.
+/// Length of a voxel of level 0 along the rays, world units.
 HWY_INLINE F voxel_along(const PacketMedium& medium, const Packet& packet, int at) {
   return hn::Div(set(medium.unit), hn::Sqrt(squared_voxels_per_unit(medium, packet, at)));
 }
@@ -38,15 +38,30 @@ static HWY_NOINLINE void begin_steps(const PacketMedium& medium, Packet& packet,
   }
 }
 
-/// The last step of lanes in bricks where nothing bends light ended a little beyond these bricks. This moves the lanes
-/// to the bricks where they are now. (Other lanes move when their samples are located. What their neighbours do does
+/// The faces of the lanes' leaves, between which positions are.
+struct LeafFaces {
+  F3 low, high;
+};
+
+HWY_INLINE LeafFaces faces_of(const Packet& packet, int at) {
+  const F cells = set(TensorBrick::cells);
+  if (HWY_LIKELY(!packet.refined)) return {zeros(), {cells, cells, cells}};
+  const F3 low = load(packet.first, at);
+  const F size = hn::Div(cells, load(packet.scale, at));
+  return {low, add(low, {size, size, size})};
+}
+
+/// The last step of lanes in leaves where nothing bends light ended a little beyond these leaves. This moves the lanes
+/// to the leaves where they are now. (Other lanes move when their samples are located. What their neighbours do does
 /// not matter.)
 static HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packet& packet) {
-  const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
+  const F zero = hn::Zero(floats);
   const auto moves = [&](int i) HWY_ATTR {
     const F3 p = load(packet.now.p, i);
-    const auto beyond = [&](F x) HWY_ATTR { return hn::Or(hn::Lt(x, zero), hn::Ge(x, end)); };
-    return hn::And(hn::Eq(load(packet.strongest, i), zero), hn::Or(beyond(p.x), hn::Or(beyond(p.y), beyond(p.z))));
+    const auto [low, high] = faces_of(packet, i);
+    const auto beyond = [](F x, F from, F to) HWY_ATTR { return hn::Or(hn::Lt(x, from), hn::Ge(x, to)); };
+    return hn::And(hn::Eq(load(packet.strongest, i), zero),
+                   hn::Or(beyond(p.x, low.x, high.x), hn::Or(beyond(p.y, low.y, high.y), beyond(p.z, low.z, high.z))));
   };
   std::uint32_t any = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) any |= to_bits(moves(i), i);
@@ -57,25 +72,37 @@ static HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packe
   });
 }
 
+/// Limits the lanes' next steps by the voxels of their leaves.
+HWY_INLINE F limited_by_leaf(const PacketMedium& medium, Packet& packet, F wanted, int at) {
+  const F limited = hn::Min(wanted, hn::Div(set(medium.longest_step), load(packet.scale, at)));
+  if (medium.adaptive) store(limited, packet.wanted, at);
+  return limited;
+}
+
 /// Sets the length of the next step.
 static HWY_NOINLINE void find_times(const PacketMedium& medium, Packet& packet) {
   if (packet.straight) leave_straight_bricks(medium, packet);
-  const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
+  const F zero = hn::Zero(floats);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F voxel = voxel_along(medium, packet, i);
-    F time = hn::Mul(load(packet.wanted, i), voxel);
+    F wanted = load(packet.wanted, i);
+    if (packet.refined) wanted = limited_by_leaf(medium, packet, wanted, i);
+    F time = hn::Mul(wanted, voxel);
     if (packet.straight) {
-      // The step ends a little beyond the brick where nothing bends light, so that rounding does not keep the ray in
-      // the brick.
+      // The step ends a little beyond the leaf where nothing bends light, so that rounding does not keep the ray in
+      // the leaf.
       const F3 p = load(packet.now.p, i), u = load(packet.now.u, i);
-      const auto way = [&](F x, F along) HWY_ATTR {
-        const F to = hn::Sub(hn::IfThenElse(hn::Gt(along, zero), end, zero), x);
-        return hn::IfThenElse(hn::Eq(along, zero), set(1e30f), hn::Div(to, along));
+      const auto [low, high] = faces_of(packet, i);
+      const auto way = [&](F x, F along, F from, F to) HWY_ATTR {
+        const F rest = hn::Sub(hn::IfThenElse(hn::Gt(along, zero), to, from), x);
+        return hn::IfThenElse(hn::Eq(along, zero), set(1e30f), hn::Div(rest, along));
       };
-      const F out = hn::Min(hn::Min(way(p.x, u.x), way(p.y, u.y)), way(p.z, u.z));
-      const auto within = [&](F x) HWY_ATTR { return hn::And(hn::Ge(x, zero), hn::Le(x, end)); };
-      const Mask crosses = hn::And(hn::And(within(p.x), hn::And(within(p.y), within(p.z))),
-                                   hn::And(hn::Eq(load(packet.strongest, i), zero), hn::Lt(out, set(1e29f))));
+      const F out =
+          hn::Min(hn::Min(way(p.x, u.x, low.x, high.x), way(p.y, u.y, low.y, high.y)), way(p.z, u.z, low.z, high.z));
+      const auto within = [](F x, F from, F to) HWY_ATTR { return hn::And(hn::Ge(x, from), hn::Le(x, to)); };
+      const Mask inside =
+          hn::And(within(p.x, low.x, high.x), hn::And(within(p.y, low.y, high.y), within(p.z, low.z, high.z)));
+      const Mask crosses = hn::And(inside, hn::And(hn::Eq(load(packet.strongest, i), zero), hn::Lt(out, set(1e29f))));
       const F past = set(static_cast<float>(step_lengths::past_straight_brick));
       time = hn::IfThenElse(crosses, hn::MulAdd(past, voxel, out), time);
     }
@@ -205,8 +232,9 @@ HWY_INLINE F3 bend_differential(const Tensor& T, const Tensor& dT, const F3& v, 
 template <int components>
 HWY_INLINE Tensor tensor_along(const PacketMedium& medium, const Packet& packet, const F3& dp, int at) {
   // The tensor does not change along axes of a single voxel.
-  const F3 along{hn::Mul(dp.x, set(medium.slope[0])), hn::Mul(dp.y, set(medium.slope[1])),
-                 hn::Mul(dp.z, set(medium.slope[2]))};
+  F3 along{hn::Mul(dp.x, set(medium.slope[0])), hn::Mul(dp.y, set(medium.slope[1])),
+           hn::Mul(dp.z, set(medium.slope[2]))};
+  if (packet.refined) along = mul(load(packet.scale, at), along);
   return tensor_of<components>([&](int i) HWY_ATTR {
     return dot(along, {load(packet.slopes[0][i], at), load(packet.slopes[1][i], at), load(packet.slopes[2][i], at)});
   });
@@ -288,16 +316,26 @@ HWY_INLINE void end_step(const PacketMedium& medium, Packet& packet, const Compo
   }
 }
 
-/// Takes a step of length `time`. May move lanes to other bricks.
+/// Sets `finest`, at the beginning of a step or with another sample of it.
+HWY_INLINE void keep_finest(Packet& packet, bool is_first) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F scale = load(packet.scale, i);
+    store(is_first ? scale : hn::Max(scale, load(packet.finest, i)), packet.finest, i);
+  }
+}
+
+/// Takes a step of length `time`. May move lanes to other leaves.
 template <int components, bool differentials>
 HWY_NOINLINE void take_step(const PacketMedium& medium, Packet& packet) {
   ComposedStep step;
   begin_step<differentials>(medium, packet, step);
+  if (medium.levels) keep_finest(packet, true);
   bool near_surface = false;  // In any brick that is sampled.
   for (int n = 0; n < medium.method.kicks; ++n) {
     drift<differentials>(medium, packet, medium.method.drift[n], step);
     locate(medium, packet, [&](int i) HWY_ATTR { return add(load(packet.now.p, i), load(step.ahead, i)); });
     near_surface |= packet.near_surface;
+    if (medium.levels) keep_finest(packet, false);
     sample_tensors<components, differentials>(packet);
     kick<components, differentials>(medium, packet, medium.method.kick[n], step);
     const F weight = set(static_cast<float>(medium.method.error[n + 1]));
@@ -347,16 +385,23 @@ HWY_INLINE F growth(F excess) {
   return hn::IfThenElse(hn::Eq(excess, excess), hn::Min(hn::Max(factor, least), most), least);
 }
 
-/// Sets the next steps from the errors of these. Lanes with too great an error stay.
+/// Sets the next steps from the errors of these. Lanes with too great an error stay, and those whose step was too long
+/// for a finer leaf into which it led: samples might miss what is there.
 /// @return the lanes that stay, as bits.
 template <bool differentials>
 HWY_NOINLINE std::uint32_t control_steps(const PacketMedium& medium, Packet& packet) {
   std::uint32_t staying = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F excess = load(packet.excess, i), wanted = load(packet.wanted, i);
-    store(hn::Min(hn::Mul(wanted, growth(excess)), set(medium.longest_step)), packet.wanted, i);
+    F longest = set(medium.longest_step);
+    Mask fails = hn::Gt(excess, set(1));
+    if (medium.levels) {
+      longest = hn::Div(longest, load(packet.finest, i));
+      fails = hn::Or(fails, hn::Gt(wanted, hn::Mul(set(1.001f), longest)));
+    }
+    store(hn::Min(hn::Mul(wanted, growth(excess)), longest), packet.wanted, i);
     const F3 v = load(packet.next.v, i);  // A lane without a direction does not stay: it stops, whatever its error.
-    staying |= to_bits(hn::And(hn::Gt(excess, set(1)), hn::Gt(dot(v, v), hn::Zero(floats))), i);
+    staying |= to_bits(hn::And(fails, hn::Gt(dot(v, v), hn::Zero(floats))), i);
   }
   for_lanes(staying, [&](int lane) {
     packet.time[lane] = packet.change_of_step[lane] = 0;

@@ -11,6 +11,7 @@
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
 #include "tracing/steps/bending_steps.h"
+#include "volumes/bricks/brick_point.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
@@ -26,6 +27,13 @@ constexpr double composed_landing = 1e-3, other_landing = 1e-10;
 inline double deviator_norm(const Eigen::Matrix3d& T) {
   const double third = T.trace() / 3;
   return std::sqrt(std::max(0.0, T.squaredNorm() - 3 * third * third));
+}
+
+/// How many voxels of the leaf at a point are along an edge of a voxel of level 0.
+inline double leaf_scale(const TensorField& field, const Eigen::Vector3d& world) {
+  if (field.levels() == 1) return 1;
+  const BrickPoint at = brick_point(field, field.to_index() * world);
+  return double{field.leaf({at.brick[0], at.brick[1], at.brick[2]}, at.position).scale};
 }
 
 /// How far a ray has been traced.
@@ -151,7 +159,7 @@ class Tracer {
   Eigen::Vector3d direction() const { return ray_.direction(); }
   RayEnd end_on(Surface surface) const { return surface == Surface::plate ? RayEnd::plate : RayEnd::obstacle; }
   State<N> step(double h, State<N>& error) { return advance(settings_.method, medium_, ray_, h, error); }
-  double length_of_voxel() const { return 1 / (field_.to_index().linear() * direction()).norm(); }
+  double length_of_voxel() const { return 1 / (field_.to_index().linear() * direction()).norm() / scale_; }
   bool ends_before(double distance) const { return length_ + distance >= settings_.max_length; }
   bool is_composed() const { return settings_.method == BendingMethod::splitting4; }
 
@@ -344,17 +352,37 @@ class Tracer {
     return length;
   }
 
-  /// Sets the next adaptive step from the error of this one. @return the error divided by the tolerance.
-  double control_step(const State<N>& error) {
+  /// The limit of adaptive steps, in voxels.
+  double longest_step() const {
     using namespace step_lengths;
-    const double excess = std::max(error.position().norm() / voxel_, error.direction().norm()) / settings_.tolerance;
+    return is_composed() ? longest_composed : settings_.step > 0 ? settings_.step : longest_adaptive;
+  }
+
+  /// Finds the voxel of the leaf where the ray is. An adaptive step keeps its length from leaf to leaf, or is
+  /// shortened.
+  void find_voxel() {
+    const double scale = leaf_scale(field_, position());
+    if (scale != scale_) adaptive_step_ = std::min(adaptive_step_ * scale / scale_, longest_step());
+    scale_ = scale;
+    voxel_ = length_of_voxel();
+  }
+
+  /// Sets the next adaptive step from the error of this one, which leads to `next`.
+  /// @return whether the step must be repeated, because of its error, or because it was too long for a finer leaf into
+  /// which it led: samples might miss what is there.
+  bool control_step(const State<N>& next, const State<N>& error) {
+    using namespace step_lengths;
+    const double finer = std::max(1.0, leaf_scale(field_, next.position()) / scale_);
+    const double excess =
+        std::max(error.position().norm() / (scale_ * voxel_), error.direction().norm()) / settings_.tolerance;
     const double order = is_composed() ? composed_order : runge_kutta(settings_.method)->order;
     const double factor =
         (is_composed() ? composed_safety : safety) * std::pow(std::max(excess, min_excess), -1 / order);
     const double growth = factor > min_growth ? std::min(factor, max_growth) : min_growth;
-    const double longest = is_composed() ? longest_composed : settings_.step > 0 ? settings_.step : longest_adaptive;
+    const double longest = longest_step() / finer;
+    const bool is_too_long = finer > 1 && adaptive_step_ > 1.001 * longest;
     adaptive_step_ = std::clamp(adaptive_step_ * growth, shortest_adaptive, longest);
-    return excess;
+    return excess > 1 || is_too_long;
   }
 
   /// The length of the next step, world units. If nothing in the brick bends light, the step ends a little beyond the
@@ -372,14 +400,14 @@ class Tracer {
   /// Steps through the field to an absorber, out of the box or out of the cut. Returns nothing if the ray leaves the
   /// cut.
   std::optional<RayEnd> bend(double first_step, const State<N>* first_end) {
-    voxel_ = length_of_voxel();
+    find_voxel();
     if (!(first_step > 0)) medium_.sample(ray_.P);  // For `automatic_step`.
     adaptive_step_ = first_step > 0 ? first_step / voxel_ : settings_.step == 0 ? automatic_step() : settings_.step;
     record(true);
     while (true) {
       if (steps_ >= static_cast<std::uint32_t>(settings_.max_steps)) return RayEnd::step_limit;
       ++steps_;
-      voxel_ = length_of_voxel();
+      find_voxel();
       const double wanted = first_step > 0 ? first_step : next_step();
       const double rest = settings_.max_length - length_, h = std::min(wanted, rest);
       first_step = 0;
@@ -390,7 +418,7 @@ class Tracer {
       if (event == Event::none) {
         next = step(h, error);
         if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
-        if (is_controlled_ && control_step(error) > 1 && wanted > step_lengths::shortest_adaptive * voxel_) continue;
+        if (is_controlled_ && control_step(next, error) && wanted > step_lengths::shortest_adaptive * voxel_) continue;
         event = meet(next, h, landing);
       }
       if (event == Event::none) {
@@ -421,7 +449,8 @@ class Tracer {
   PathPoints* record_ = nullptr;      // Null: the ray is not recorded.
   double length_ = 0;                 // Length of the path so far, world units.
   Eigen::RowVector2d length_change_;  // Derivatives of length_.
-  double voxel_ = 0;                  // Length of a voxel along the ray, world units.
+  double scale_ = 1;                  // Of the leaf: LeafBrick::scale.
+  double voxel_ = 0;                  // Length of a voxel of the leaf along the ray, world units.
   double adaptive_step_ = 0;          // The next step by the error control, in voxels.
   std::uint32_t steps_ = 0;
   int grazes_ = 0;

@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "volumes/bricks/coefficients.h"
+#include "volumes/bricks/finer_bricks.h"
 
 namespace tensorray {
 namespace {
@@ -34,12 +35,13 @@ StoredTensor beyond(const Coefficients& field, Vector3i index, int axis, int fac
   const AlignedBox3i& extent = field.extent;
   const int size = extent.max()[axis] - extent.min()[axis] + 1;
   int run = 0;
-  for (Vector3i along = index.cwiseMax(extent.min()).cwiseMin(extent.max()); run < 4; ++run) {
+  Vector3i along = index.cwiseMax(extent.min()).cwiseMin(extent.max());
+  for (; run < 4; ++run) {
     along[axis] = face + run * inward;
     if (!find_voxel(field.bricks, field.bricks.filled, along)) break;
   }
-  const bool is_parabola =
-      run == 3 && (size == 3 || field.interpolant.border == Border::extend);  // Both ends of the run continue.
+  const bool extends = field.interpolant.border == Border::extend && is_free(field.bricks, along);
+  const bool is_parabola = run == 3 && (size == 3 || extends);  // Both ends of the run continue.
   const int terms = size == 1 ? 1 : run < 3 ? 2 : is_parabola ? 3 : 4;
   StoredTensor sum = StoredTensor::Zero();
   for (int i = 0; i < terms; ++i) {
@@ -154,6 +156,8 @@ float finish_brick(const Coefficients& field, const Vector3i& place, float* bric
   const AlignedBox3i covered(TensorBlock::size * place - Vector3i::Ones(),
                              TensorBlock::size * place + Vector3i::Constant(TensorBlock::size + 1));
   if (std::is_same_v<Brick, CubicBrick> && !field.extent.contains(covered)) extrapolate(field, place, brick);
+  if (std::is_same_v<Brick, CubicBrick> && field.coarser)
+    add_coarser(*field.coarser, place, field.blocks.components, brick);
   return strongest_of<Brick, components>(brick);
 }
 

@@ -22,37 +22,6 @@ int reach_of(const Interpolant& interpolant) {
   return interpolant.border == Border::extend ? 2 : interpolant.between == Interpolation::linear ? 0 : 1;
 }
 
-Vector3i place_of(const Vector3i& voxel) {
-  return voxel.unaryExpr([](int v) { return v >> 3; });
-}
-
-bool any_of(const VoxelMask& mask) {
-  return std::any_of(mask.begin(), mask.end(), [](std::uint8_t row) { return row != 0; });
-}
-
-VoxelMask mask_of(const BlockShape& shape) {
-  VoxelMask mask{};
-  if (shape.active.all()) mask.fill(0xff);
-  if (shape.active.all()) return mask;
-  for (std::size_t row = 0; row < mask.size(); ++row)
-    for (std::size_t z = 0; z < block_edge; ++z)
-      mask[row] = static_cast<std::uint8_t>(mask[row] | (shape.active[row * block_edge + z] ? 1u << z : 0u));
-  return mask;
-}
-
-/// Orders places by x, then y, then z, and removes those that are there twice.
-void sort_places(std::vector<Vector3i>& places) {
-  tbb::parallel_sort(places.begin(), places.end(), [](const Vector3i& a, const Vector3i& b) {
-    return std::make_tuple(a.x(), a.y(), a.z()) < std::make_tuple(b.x(), b.y(), b.z());
-  });
-  places.erase(std::unique(places.begin(), places.end()), places.end());
-}
-
-/// The range of bricks that hold the cells between the voxels of a box. An axis with a single voxel has one cell.
-AlignedBox3i bricks_with_cells(const AlignedBox3i& voxels) {
-  return {place_of(voxels.min()), place_of((voxels.max().array() - 1).matrix().cwiseMax(voxels.min()))};
-}
-
 /// The places of the blocks, and all about them.
 std::vector<Vector3i> places_about(const BlockTable& table) {
   std::vector<Vector3i> places = table.places;
@@ -82,20 +51,6 @@ VoxelMask spread(const VoxelMask& mask, int axis, int reach, const VoxelMask* be
       result[i] = static_cast<std::uint8_t>(any);
     }
   return result;
-}
-
-/// Removes voxels outside the extent.
-void cut(VoxelMask& mask, const Vector3i& place, const AlignedBox3i& extent) {
-  const Vector3i low = (extent.min() - block_edge * place).cwiseMax(0),
-                 high = (extent.max() - block_edge * place).cwiseMin(block_edge - 1);
-  unsigned along_z = 0;
-  for (int z = low.z(); z <= high.z(); ++z) along_z |= 1u << z;
-  for (int x = 0; x < block_edge; ++x)
-    for (int y = 0; y < block_edge; ++y) {
-      const bool inside = x >= low.x() && x <= high.x() && y >= low.y() && y <= high.y();
-      std::uint8_t& row = mask[static_cast<std::size_t>(x * block_edge + y)];
-      row = inside ? static_cast<std::uint8_t>(row & along_z) : std::uint8_t{0};
-    }
 }
 
 /// How many voxels a brick needs of the blocks before and behind its own, along each axis.
@@ -129,6 +84,48 @@ std::size_t max_places_of_slab() {
 
 }  // namespace
 
+Vector3i place_of(const Vector3i& voxel) {
+  return voxel.unaryExpr([](int v) { return v >> 3; });
+}
+
+bool any_of(const VoxelMask& mask) {
+  return std::any_of(mask.begin(), mask.end(), [](std::uint8_t row) { return row != 0; });
+}
+
+VoxelMask mask_of(const BlockShape& shape) {
+  VoxelMask mask{};
+  if (shape.active.all()) mask.fill(0xff);
+  if (shape.active.all()) return mask;
+  for (std::size_t row = 0; row < mask.size(); ++row)
+    for (std::size_t z = 0; z < block_edge; ++z)
+      mask[row] = static_cast<std::uint8_t>(mask[row] | (shape.active[row * block_edge + z] ? 1u << z : 0u));
+  return mask;
+}
+
+void cut(VoxelMask& mask, const Vector3i& place, const AlignedBox3i& extent) {
+  const Vector3i low = (extent.min() - block_edge * place).cwiseMax(0),
+                 high = (extent.max() - block_edge * place).cwiseMin(block_edge - 1);
+  unsigned along_z = 0;
+  for (int z = low.z(); z <= high.z(); ++z) along_z |= 1u << z;
+  for (int x = 0; x < block_edge; ++x)
+    for (int y = 0; y < block_edge; ++y) {
+      const bool inside = x >= low.x() && x <= high.x() && y >= low.y() && y <= high.y();
+      std::uint8_t& row = mask[static_cast<std::size_t>(x * block_edge + y)];
+      row = inside ? static_cast<std::uint8_t>(row & along_z) : std::uint8_t{0};
+    }
+}
+
+void sort_places(std::vector<Vector3i>& places) {
+  tbb::parallel_sort(places.begin(), places.end(), [](const Vector3i& a, const Vector3i& b) {
+    return std::make_tuple(a.x(), a.y(), a.z()) < std::make_tuple(b.x(), b.y(), b.z());
+  });
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+}
+
+AlignedBox3i bricks_with_cells(const AlignedBox3i& voxels) {
+  return {place_of(voxels.min()), place_of((voxels.max().array() - 1).matrix().cwiseMax(voxels.min()))};
+}
+
 BlockTable::BlockTable(const std::vector<BlockShape>& all) : shapes(all) {
   places.reserve(shapes.size());
   for (const BlockShape& shape : shapes) places.emplace_back(shape.origin / block_edge);
@@ -147,16 +144,10 @@ std::vector<PlaceNumbers> slabs_of(const std::vector<Vector3i>& places, std::siz
   return slabs;
 }
 
-CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i& extent,
+std::vector<VoxelMask> filled_voxels(const std::vector<Vector3i>& places, const BrickIndex& found,
+                                     const std::vector<VoxelMask>& active, const AlignedBox3i& extent,
                                      const Interpolant& interpolant) {
   const int reach = reach_of(interpolant);
-  const std::vector<Vector3i> candidates = reach == 0 ? table.places : places_about(table);
-  const BrickIndex found(candidates);
-  std::vector<VoxelMask> active(candidates.size());
-  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
-    const std::uint32_t block = table.index.find(candidates[i]);
-    if (block != BrickIndex::missing) active[i] = mask_of(table.shapes[block]);
-  });
   std::vector<VoxelMask> filled = active;
   for (int axis = 0; reach > 0 && axis < 3; ++axis) {
     const std::vector<VoxelMask> from = filled;
@@ -164,15 +155,31 @@ CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i
       const std::uint32_t at = found.find(place);
       return at == BrickIndex::missing ? nullptr : &from[at];
     };
-    tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) {
       const Vector3i along = Vector3i::Unit(axis);
-      filled[i] = spread(from[i], axis, reach, mask_at(candidates[i] - along), mask_at(candidates[i] + along));
-      if (axis == 2) cut(filled[i], candidates[i], extent);
+      filled[i] = spread(from[i], axis, reach, mask_at(places[i] - along), mask_at(places[i] + along));
+      if (axis == 2) cut(filled[i], places[i], extent);
     });
   }
+  return filled;
+}
+
+void make_slabs(CoefficientBricks& bricks) { bricks.slabs = slabs_of(bricks.places, max_places_of_slab()); }
+
+CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i& extent,
+                                     const Interpolant& interpolant, const std::vector<Vector3i>& refined) {
+  const std::vector<Vector3i> candidates = reach_of(interpolant) == 0 ? table.places : places_about(table);
+  const BrickIndex found(candidates);
+  std::vector<VoxelMask> active(candidates.size());
+  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    const std::uint32_t block = table.index.find(candidates[i]);
+    if (block != BrickIndex::missing) active[i] = mask_of(table.shapes[block]);
+  });
+  const std::vector<VoxelMask> filled = filled_voxels(candidates, found, active, extent, interpolant);
 
   const AlignedBox3i with_cells = bricks_with_cells(extent);
   CoefficientBricks result;
+  result.places = refined;
   std::vector<Vector3i> others;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (!any_of(filled[i])) continue;
@@ -189,7 +196,7 @@ CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i
   result.count = result.places.size();
   result.places.insert(result.places.end(), others.begin(), others.end());
   result.index = BrickIndex(result.places);
-  result.slabs = slabs_of(result.places, max_places_of_slab());
+  make_slabs(result);
   for (const Vector3i& place : result.places) {
     const std::uint32_t at = found.find(place);
     result.filled.push_back(at == BrickIndex::missing ? VoxelMask{} : filled[at]);
@@ -214,6 +221,11 @@ std::optional<BlockVoxel> find_voxel(const CoefficientBricks& bricks, const std:
   const BlockVoxel voxel{block, index.x() & 7, index.y() & 7, index.z() & 7};
   if (!is_set(masks[block], voxel.x, voxel.y, voxel.z)) return std::nullopt;
   return voxel;
+}
+
+bool is_free(const CoefficientBricks& bricks, const Vector3i& index) {
+  const std::uint32_t block = bricks.free.empty() ? BrickIndex::missing : bricks.index.find(place_of(index));
+  return block == BrickIndex::missing || is_set(bricks.free[block], index.x() & 7, index.y() & 7, index.z() & 7);
 }
 
 }  // namespace tensorray

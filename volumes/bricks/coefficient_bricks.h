@@ -54,24 +54,55 @@ struct CoefficientBricks {
   std::vector<VoxelMask> filled;
   std::vector<VoxelMask> active;
 
+  /// Of a finer level, the voxels that may have coefficients (finer_bricks.h); empty: all.
+  std::vector<VoxelMask> free = {};
+
   /// All places, in slabs across x: what is made at a time (make_coefficients).
   std::vector<PlaceNumbers> slabs;
 };
+
+Eigen::Vector3i place_of(const Eigen::Vector3i& voxel);
+VoxelMask mask_of(const BlockShape& shape);
+bool any_of(const VoxelMask& mask);
+
+/// Removes the voxels of a place that are outside the extent.
+void cut(VoxelMask& mask, const Eigen::Vector3i& place, const Eigen::AlignedBox3i& extent);
+
+/// Orders places by x, then y, then z, and removes those that are there twice.
+void sort_places(std::vector<Eigen::Vector3i>& places);
+
+/// The range of bricks that hold the cells between the voxels of a box. An axis with a single voxel has one cell.
+Eigen::AlignedBox3i bricks_with_cells(const Eigen::AlignedBox3i& voxels);
+
+/// CoefficientBricks::filled of places, from `active`. @param found  Finds the places.
+std::vector<VoxelMask> filled_voxels(const std::vector<Eigen::Vector3i>& places, const BrickIndex& found,
+                                     const std::vector<VoxelMask>& active, const Eigen::AlignedBox3i& extent,
+                                     const Interpolant& interpolant);
+
+/// Divides `places` in slabs: what is made at a time with the memory that there is.
+void make_slabs(CoefficientBricks& bricks);
 
 /// Places in slabs across x, in their order: each of at most `most` places, or with one place along x.
 std::vector<PlaceNumbers> slabs_of(const std::vector<Eigen::Vector3i>& places, std::size_t most);
 
 /// @param extent  As TensorField::voxels. @param interpolant  Of a linear field, `extend` only if it has a surface.
-/// Runs on all threads.
+/// @param refined  Places that get a brick in any case. Runs on all threads.
 CoefficientBricks coefficient_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent,
-                                     const Interpolant& interpolant);
+                                     const Interpolant& interpolant, const std::vector<Eigen::Vector3i>& refined = {});
+
+/// The bricks of the level before a finer one.
+struct CoarserLevel {
+  const BrickIndex& index;
+  const BrickMemory& memory;
+};
 
 /// The coefficients of all voxels, or their values before.
 struct Coefficients {
   const CoefficientBricks& bricks;
   const Eigen::AlignedBox3i& extent;  ///< As TensorField::voxels.
   Interpolant interpolant;
-  const BrickMemory& blocks;  ///< Of `bricks.places`, in the layout of CoefficientBlock.
+  const BrickMemory& blocks;              ///< Of `bricks.places`, in the layout of CoefficientBlock.
+  const CoarserLevel* coarser = nullptr;  ///< Of a finer level: what its bricks are added to.
 };
 
 /// What is stored of a coefficient, with T₂₂ last.
@@ -95,5 +126,8 @@ void write_coefficient(const StoredTensor& value, int components, float* floats,
 /// The voxel at an index, if it is set in `masks`, which are `filled` or `active` of the bricks, or like them.
 std::optional<BlockVoxel> find_voxel(const CoefficientBricks& bricks, const std::vector<VoxelMask>& masks,
                                      const Eigen::Vector3i& index);
+
+/// Whether a voxel within the extent may have a coefficient. Where a place is missing, all about it may.
+bool is_free(const CoefficientBricks& bricks, const Eigen::Vector3i& index);
 
 }  // namespace tensorray

@@ -70,15 +70,17 @@ struct Column {
   std::vector<std::uint32_t> blocks;
 };
 
-/// The voxels of a column on a line along its axis: `set(i)` says whether voxel i has a coefficient.
+/// The voxels of a column on a line along its axis: `set(i)` says whether voxel i has a coefficient, and `free(i)`
+/// whether it may have one.
 struct Runs {
   int axis, begin, count;  // Index of the first voxel along the axis, and number of voxels.
   const AlignedBox3i& extent;
   Border border;
 
   /// Calls solve(from, length, continues_before, continues_after) for each run.
-  template <class Set, class Solve>
-  void visit(const Set& set, const Solve& solve) const {
+  template <class Set, class Free, class Solve>
+  void visit(const Set& set, const Free& free, const Solve& solve) const {
+    const auto extends = [&](int i) { return border == Border::extend && (i < 0 || i >= count || free(i)); };
     for (int from = 0; from < count;) {
       if (!set(from)) {
         ++from;
@@ -86,9 +88,8 @@ struct Runs {
       }
       int end = from + 1;
       while (end < count && set(end)) ++end;
-      const bool extends = border == Border::extend;
-      solve(from, end - from, extends || begin + from == extent.min()[axis],
-            extends || begin + end - 1 == extent.max()[axis]);
+      solve(from, end - from, extends(from - 1) || begin + from == extent.min()[axis],
+            extends(end) || begin + end - 1 == extent.max()[axis]);
       from = end;
     }
   }
@@ -96,10 +97,10 @@ struct Runs {
 
 /// Solves the runs of a line of voxels or of rows of eight voxels along z. `number(i)` is the number, in block
 /// i / 8, of what is at place i of the line.
-template <int components, int voxels, class Set, class Number>
-void solve_line(const Column& column, const Runs& runs, const BrickMemory& memory, const Set& set, const Number& number,
-                std::vector<float*>& pointers) {
-  runs.visit(set, [&](int from, int length, bool continues_before, bool continues_after) {
+template <int components, int voxels, class Set, class Free, class Number>
+void solve_line(const Column& column, const Runs& runs, const BrickMemory& memory, const Set& set, const Free& free,
+                const Number& number, std::vector<float*>& pointers) {
+  runs.visit(set, free, [&](int from, int length, bool continues_before, bool continues_after) {
     pointers.resize(2 * static_cast<std::size_t>(length));
     float** const bending = pointers.data();
     float** const trailing = bending + length;
@@ -114,30 +115,52 @@ void solve_line(const Column& column, const Runs& runs, const BrickMemory& memor
   });
 }
 
+/// The rows of voxels along z at a line along x or y, as masks.
+struct LineOfRows {
+  const CoefficientBricks& bricks;
+  const Column& column;
+  bool along_x;
+  int across, count;
+
+  std::uint8_t row(const std::vector<VoxelMask>& masks, int i) const {
+    const int within = i % edge, at = along_x ? within * edge + across : across * edge + within;
+    return masks[column.blocks[static_cast<std::size_t>(i / edge)]][static_cast<std::size_t>(at)];
+  }
+  std::uint8_t filled(int i) const { return row(bricks.filled, i); }
+  std::uint8_t free(int i) const { return bricks.free.empty() ? std::uint8_t{0xff} : row(bricks.free, i); }
+
+  /// Whether the lanes of the rows with coefficients have the same runs; the others are zero, and stay so.
+  bool is_uniform() const {
+    std::uint8_t lanes = bricks.free.empty() ? 0xff : 0;
+    for (int i = 0; i < count; ++i) {
+      if (lanes == 0) lanes = filled(i);
+      if (filled(i) != 0 && filled(i) != lanes) return false;
+    }
+    for (int i = 0; i < count; ++i)
+      if ((free(i) & lanes) != 0 && (free(i) & lanes) != lanes) return false;
+    return true;
+  }
+};
+
 /// Solves the lines of a column along x or y: eight neighbours along z together where they have the same runs.
 template <int components>
 void solve_across(const CoefficientBricks& bricks, const Column& column, const Runs& runs, const BrickMemory& memory) {
   std::vector<float*> pointers;
   const bool along_x = runs.axis == 0;
   for (int across = 0; across < edge; ++across) {
-    const auto row = [&](int i) {
-      const int within = i % edge;
-      return bricks.filled[column.blocks[static_cast<std::size_t>(i / edge)]]
-                          [static_cast<std::size_t>(along_x ? within * edge + across : across * edge + within)];
-    };
+    const LineOfRows line{bricks, column, along_x, across, runs.count};
     const auto number = [&](int i, int z) {
       return along_x ? CoefficientBlock::coefficient(i, across, z) : CoefficientBlock::coefficient(across, i, z);
     };
-    bool same = true;
-    for (int i = 0; i < runs.count && same; ++i) same = row(i) == 0 || row(i) == 0xff;
-    if (same)
+    if (line.is_uniform())
       solve_line<components, edge>(
-          column, runs, memory, [&](int i) { return row(i) != 0; }, [&](int i) { return number(i, 0); }, pointers);
+          column, runs, memory, [&](int i) { return line.filled(i) != 0; }, [&](int i) { return line.free(i) != 0; },
+          [&](int i) { return number(i, 0); }, pointers);
     else
       for (int z = 0; z < edge; ++z)
         solve_line<components, 1>(
-            column, runs, memory, [&](int i) { return (row(i) >> z & 1) != 0; }, [&](int i) { return number(i, z); },
-            pointers);
+            column, runs, memory, [&](int i) { return (line.filled(i) >> z & 1) != 0; },
+            [&](int i) { return (line.free(i) >> z & 1) != 0; }, [&](int i) { return number(i, z); }, pointers);
   }
 }
 
@@ -146,12 +169,14 @@ template <int components>
 void solve_along_z(const CoefficientBricks& bricks, const Column& column, const Runs& runs, const BrickMemory& memory) {
   std::vector<float*> pointers;
   for (int line = 0; line < edge * edge; ++line) {
-    const auto set = [&](int i) {
-      const VoxelMask& mask = bricks.filled[column.blocks[static_cast<std::size_t>(i / edge)]];
+    const auto is_in = [&](const std::vector<VoxelMask>& masks, int i) {
+      const VoxelMask& mask = masks[column.blocks[static_cast<std::size_t>(i / edge)]];
       return (mask[static_cast<std::size_t>(line)] >> i % edge & 1) != 0;
     };
     solve_line<components, 1>(
-        column, runs, memory, set, [&](int i) { return line * edge + i; }, pointers);
+        column, runs, memory, [&](int i) { return is_in(bricks.filled, i); },
+        [&](int i) { return bricks.free.empty() || is_in(bricks.free, i); }, [&](int i) { return line * edge + i; },
+        pointers);
   }
 }
 
@@ -296,12 +321,23 @@ VoxelMask continue_block(std::size_t block, const Coefficients& field, const std
 
 }  // namespace
 
-BrickMemory brick_memory(const CoefficientBricks& bricks, Interpolation between, int components) {
+BrickMemory brick_memory(const std::vector<CoefficientBricks>& levels, Interpolation between, int components) {
   const auto brick = static_cast<std::size_t>(between == Interpolation::linear ? LinearBrick::stored_floats(components)
                                                                                : CubicBrick::stored_floats(components));
   const std::size_t block = static_cast<std::size_t>(CoefficientBlock::stored_floats(components));
-  const std::size_t floats = begin_of_blocks(bricks, brick, components) + bricks.places.size() * block;
+  std::size_t first = 0, floats = 0;
+  for (const CoefficientBricks& level : levels) {
+    floats = std::max(floats, first * brick + begin_of_blocks(level, brick, components) + level.places.size() * block);
+    first += level.count;
+  }
   return make_bricks((floats + brick - 1) / brick, static_cast<int>(brick), components);
+}
+
+BrickMemory bricks_from(const BrickMemory& memory, std::size_t first, std::size_t count) {
+  BrickMemory bricks = memory;
+  bricks.count = count;
+  bricks.floats = std::shared_ptr<float[]>(memory.floats, memory.brick(first));
+  return bricks;
 }
 
 BrickMemory blocks_within(const BrickMemory& memory, const CoefficientBricks& bricks) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "base/geometry/box.h"
 #include "volumes/bricks/brick_layout.h"
 #include "volumes/bricks/coefficients.h"
+#include "volumes/bricks/finer_bricks.h"
 
 namespace tensorray {
 namespace {
@@ -60,26 +62,115 @@ Interpolant used_interpolant(Interpolant interpolant, bool has_surface) {
   return interpolant;
 }
 
-/// Reads each block once, on all threads, and places its values. @param norms  Get the greatest squared norms.
-/// @return false if a block is not symmetric, as those of `blocks` must be.
-bool place_blocks(const BlockSource& source, const BlockTable& table, const CoefficientBricks& bricks,
-                  const BrickMemory& blocks, std::vector<double>& norms) {
+/// The blocks of a level.
+struct LevelBlocks {
+  const std::vector<BlockShape>& shapes;
+  const std::function<void(std::size_t i, TensorBlock& block)>& fill;
+};
+
+LevelBlocks blocks_of(const BlockSource& source, std::size_t level) {
+  if (level == 0) return {source.shapes, source.fill};
+  return {source.finer[level - 1].shapes, source.finer[level - 1].fill};
+}
+
+/// What the bricks of a level are made of.
+struct LevelPlan {
+  LevelBlocks blocks;
+  BlockTable table;
+  Eigen::AlignedBox3i extent;
+};
+
+/// Reads each block once, on all threads, and places its values; of a finer level, what the coarser spline leaves.
+/// @param norm  Becomes the greatest squared norm, if it is greater.
+/// @return false if a block is not symmetric, as those of `field.blocks` must be.
+bool place_blocks(const LevelPlan& level, const Coefficients& field, double& norm) {
   constexpr std::size_t grain = 16;  // Number of blocks that a thread places in a row.
   std::atomic<bool> fits{true};
-  const tbb::blocked_range<std::size_t> all(0, source.shapes.size(), grain);
-  tbb::parallel_for(all, [&](const tbb::blocked_range<std::size_t>& range) {
+  const std::size_t count = field.bricks.places.size();
+  std::vector<double> norms(count);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
     TensorBlock block;
     for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
-      read_block(source, i, block);
-      const std::uint32_t at = bricks.index.find(table.places[i]);
-      if (at == BrickIndex::missing) continue;  // It has no active voxel.
-      if (const auto norm = place_values(block, blocks.components, blocks.brick(at)))
-        norms[i] = *norm;
-      else
-        fits = false;
+      float* const values = field.blocks.brick(i);
+      const std::uint32_t at = level.table.index.find(field.bricks.places[i]);
+      if (at != BrickIndex::missing) {
+        read_block(level.blocks.shapes[at], level.blocks.fill, at, block);
+        if (const auto square = place_values(block, field.blocks.components, values))
+          norms[i] = *square;
+        else
+          fits = false;
+      }
+      if (field.coarser) subtract_coarser(field, i, values);
     }
   });
+  if (count > 0) norm = std::max(norm, *std::max_element(norms.begin(), norms.end()));
   return fits;
+}
+
+void check_levels(const BlockSource& source, const Eigen::AlignedBox3i& voxels, const Interpolant& interpolant) {
+  if (source.finer.empty()) return;
+  if (interpolant.between != Interpolation::cubic)
+    throw std::invalid_argument("the tensor field has several levels, which need \"interpolation\": \"cubic\"");
+  if (source.finer.size() >= max_levels) throw std::invalid_argument("the tensor field has more than 4 levels");
+  constexpr int farthest = 1 << 27;  // Indices of the finest level are integers.
+  if (voxels.min().minCoeff() < -farthest || voxels.max().maxCoeff() > farthest)
+    throw std::invalid_argument("the tensor field has several levels and voxels too far from index 0");
+}
+
+/// The levels until one that is empty.
+std::vector<LevelPlan> plans_of(const BlockSource& source, const Eigen::AlignedBox3i& voxels) {
+  std::vector<LevelPlan> plans;
+  for (std::size_t level = 0; level <= source.finer.size(); ++level) {
+    const LevelBlocks blocks = blocks_of(source, level);
+    if (blocks.shapes.empty()) break;
+    plans.push_back({blocks, BlockTable(blocks.shapes), level == 0 ? voxels : finer_extent(plans.back().extent)});
+  }
+  return plans;
+}
+
+/// The bricks of each level, until one that refines nothing.
+std::vector<CoefficientBricks> bricks_of(const std::vector<LevelPlan>& plans, const Interpolant& used) {
+  std::vector<CoefficientBricks> bricks;
+  std::vector<Eigen::Vector3i> refined;  // Of the level before.
+  for (std::size_t level = 0; level < plans.size(); ++level) {
+    const LevelPlan& plan = plans[level];
+    const auto refined_by_next = [&](const BrickIndex* existing) {
+      if (level + 1 == plans.size()) return std::vector<Eigen::Vector3i>();
+      return refined_bricks(plans[level + 1].blocks.shapes, plan.extent, existing);
+    };
+    if (level == 0) {
+      refined = refined_by_next(nullptr);
+      bricks.push_back(coefficient_bricks(plan.table, plan.extent, used, refined));
+    } else if (!refined.empty()) {
+      bricks.push_back(finer_bricks(plan.table, refined, plan.extent, used));
+      refined = refined_by_next(&bricks.back().index);
+    }
+  }
+  return bricks;
+}
+
+/// Makes the bricks of all levels. @param norm  Becomes the greatest squared norm.
+/// @return nothing if tensors do not fit into `memory`, because they are not symmetric.
+std::vector<BrickList> make_levels(const std::vector<LevelPlan>& plans, const std::vector<CoefficientBricks>& bricks,
+                                   const Interpolant& used, const BrickMemory& memory, double& norm) {
+  std::vector<BrickList> lists;
+  BrickMemory before;
+  std::size_t first = 0;
+  for (std::size_t level = 0; level < bricks.size(); ++level) {
+    const CoefficientBricks& made = bricks[level];
+    const BrickMemory within = bricks_from(memory, first, made.count), blocks = blocks_within(within, made);
+    const CoarserLevel coarser{level == 0 ? made.index : bricks[level - 1].index, before};
+    const Coefficients field{made, plans[level].extent, used, blocks, level == 0 ? nullptr : &coarser};
+    if (!place_blocks(plans[level], field, norm)) return {};
+    continue_values(field);
+    BrickList list;
+    list.strongest = make_coefficients(field, within);
+    list.places.assign(made.places.begin(), made.places.begin() + static_cast<std::ptrdiff_t>(made.count));
+    lists.push_back(std::move(list));
+    before = within;
+    first += made.count;
+  }
+  return lists;
 }
 
 }  // namespace
@@ -109,30 +200,26 @@ TensorField::TensorField(const BlockSource& source, const Interpolant& interpola
   if (!to_world_.matrix().allFinite() || !to_index_.matrix().allFinite())
     throw std::invalid_argument("the tensor field's transform cannot be inverted");
   const Eigen::AlignedBox3i voxels = voxels_of(active, index_box(source.surface, to_index_));
+  check_levels(source, voxels, interpolant);
   const Interpolant used = used_interpolant(interpolant, !source.surface.triangles.empty());
   index_bounds_ = extent_of(voxels);
   voxels_ = Eigen::AlignedBox3d(voxels.min().cast<double>(), voxels.max().cast<double>());
 
   // Blocks of voxels become those of coefficients, from which bricks are made.
-  const BlockTable table(source.shapes);
-  const CoefficientBricks bricks = coefficient_bricks(table, voxels, used);
-  std::vector<double> norms(table.shapes.size());
-  BrickMemory blocks;
+  const std::vector<LevelPlan> plans = plans_of(source, voxels);
+  const std::vector<CoefficientBricks> bricks = bricks_of(plans, used);
   for (const int components : {TensorBrick::symmetric, TensorBrick::general}) {  // Any tensors fit the second time.
-    blocks = memory_ = {};
+    memory_ = {};
     memory_ = brick_memory(bricks, interpolant.between, components);
-    blocks = blocks_within(memory_, bricks);
-    if (place_blocks(source, table, bricks, blocks, norms)) break;
+    double norm = 0;
+    bricks_ = make_levels(plans, bricks, used, memory_, norm);
+    max_norm_ = std::sqrt(norm);
+    if (!bricks_.empty()) break;
   }
-  const Coefficients coefficients{bricks, voxels, used, blocks};
-  continue_values(coefficients);
-  const std::vector<float> strongest = make_coefficients(coefficients, memory_);
-  keep_bricks(memory_, bricks.count);
-  max_norm_ = std::sqrt(*std::max_element(norms.begin(), norms.end()));
-  bricks_.assign(bricks.places.begin(), bricks.places.begin() + static_cast<std::ptrdiff_t>(bricks.count));
-  index_ = BrickIndex(bricks_);
-  index_.set_values(strongest);
-  set_trailing_offset();
+  std::size_t count = 0;
+  for (const BrickList& level : bricks_) count += level.places.size();
+  keep_bricks(memory_, count);
+  make_indices();
 }
 
 TensorField::TensorField(FieldParts parts)
@@ -141,18 +228,57 @@ TensorField::TensorField(FieldParts parts)
       to_index_(parts.to_world.inverse()),
       index_bounds_(extent_of(parts.voxels)),
       voxels_(parts.voxels.cast<double>()),
-      bricks_(std::move(parts.bricks)),
+      bricks_(std::move(parts.levels)),
       memory_(std::move(parts.memory)),
       surface_(std::make_shared<const TriangleMesh>(std::move(parts.surface))),
-      max_norm_(parts.max_norm),
-      index_(bricks_) {
-  index_.set_values(parts.strongest);
-  set_trailing_offset();
+      max_norm_(parts.max_norm) {
+  make_indices();
 }
 
-void TensorField::set_trailing_offset() {
+void TensorField::make_indices() {
   trailing_offset_ = static_cast<std::size_t>(is_cubic() ? CubicBrick::trailing_offset(memory_.components)
                                                          : LinearBrick::trailing_offset(memory_.components));
+  if (bricks_.size() > 1) family_of_.assign(memory_.count, BrickIndex::missing);
+  std::size_t end = memory_.count;
+  for (std::size_t level = bricks_.size() - 1; level > 0; --level) {
+    const BrickList& finer = bricks_[level];
+    BrickList& coarser = bricks_[level - 1];
+    const BrickIndex parents(coarser.places);
+    const std::size_t first = end - finer.places.size(), first_parent = first - coarser.places.size();
+    for (std::size_t i = 0; i < finer.places.size(); ++i) {
+      const Eigen::Vector3i place = finer.places[i], half = place.unaryExpr([](int v) { return v & 1; });
+      const std::uint32_t parent = parents.find((place - half) / 2);
+      std::uint32_t& family = family_of_[first_parent + parent];
+      if (family == BrickIndex::missing) {
+        family = static_cast<std::uint32_t>(families_.size());
+        families_.emplace_back();
+      }
+      families_[family][static_cast<std::size_t>(half.x() * 4 + half.y() * 2 + half.z())] = {
+          static_cast<std::uint32_t>(first + i), finer.strongest[i]};
+      coarser.strongest[parent] = std::max(coarser.strongest[parent], finer.strongest[i]);
+    }
+    end = first;
+  }
+  index_ = BrickIndex(bricks_[0].places);
+  index_.set_values(bricks_[0].strongest);
+}
+
+LeafBrick TensorField::leaf_within(BrickIndex::Entry entry, const std::array<float, 3>& position) const {
+  LeafBrick leaf;
+  float half = TensorBrick::cells / 2;
+  while (entry.number != BrickIndex::missing && family_of_[entry.number] != BrickIndex::missing) {
+    std::size_t member = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const bool upper = position[axis] >= leaf.first[axis] + half;
+      if (upper) leaf.first[axis] += half;
+      member = 2 * member + (upper ? 1 : 0);
+    }
+    entry = families_[family_of_[entry.number]][member];
+    leaf.scale *= 2;
+    half /= 2;
+  }
+  leaf.brick = brick_at(entry.number == BrickIndex::missing ? zeros : memory_.brick(entry.number), entry.value);
+  return leaf;
 }
 
 void TensorField::keep_with_bricks(std::shared_ptr<const void> other) {
@@ -173,7 +299,8 @@ double TensorField::surface_beyond() const {
 Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
 
 std::size_t TensorField::memory_bytes() const {
-  return brick_count() * (memory_.stride * sizeof(float) + sizeof(Eigen::Vector3i)) + index_.memory_bytes();
+  return brick_count() * (memory_.stride * sizeof(float) + sizeof(Eigen::Vector3i)) + index_.memory_bytes() +
+         families_.size() * sizeof(Family) + family_of_.size() * sizeof(family_of_[0]);
 }
 
 }  // namespace tensorray

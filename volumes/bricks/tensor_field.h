@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -76,15 +77,20 @@ struct LeafBrick {
   float scale = 1;  ///< 2 to the power of its level: its voxels along an edge of a voxel of level 0.
 };
 
+/// The bricks of a level, in the order of memory.
+struct BrickList {
+  std::vector<Eigen::Vector3i> places;  ///< Coordinates (voxel index of the level / 8), ordered by x, then y, then z.
+  std::vector<float> strongest;         ///< TensorBrick::strongest of each.
+};
+
 /// What a field consists of.
 struct FieldParts {
   Interpolant interpolant;
   Eigen::Affine3d to_world;
-  Eigen::AlignedBox3i voxels;           ///< As `TensorField::voxels`.
-  std::vector<Eigen::Vector3i> bricks;  ///< As `TensorField::bricks`.
-  std::vector<float> strongest;         ///< TensorBrick::strongest of each.
+  Eigen::AlignedBox3i voxels;     ///< As `TensorField::voxels`.
+  std::vector<BrickList> levels;  ///< At least one.
   TriangleMesh surface;
-  BrickMemory memory;  ///< In the order of `bricks`.
+  BrickMemory memory;  ///< Of all levels, one after the other.
   double max_norm = 0;
 };
 
@@ -94,8 +100,8 @@ class TensorField {
  public:
   /// Reads each block once, on all threads. The voxels of a cubic field must be finite: one that is not spoils all
   /// about it.
-  /// @throw std::invalid_argument if there is no active voxel or the transform cannot be inverted; what `source`
-  /// throws.
+  /// @throw std::invalid_argument if there is no active voxel or the transform cannot be inverted, or if there are
+  /// finer levels and the field is not cubic; what `source` throws.
   explicit TensorField(const BlockSource& source, const Interpolant& interpolant = {});
 
   /// The same from a grid.
@@ -140,12 +146,15 @@ class TensorField {
   const Interpolant& interpolant() const { return interpolant_; }
   bool is_cubic() const { return interpolant_.between == Interpolation::cubic; }
 
-  std::size_t brick_count() const { return bricks_.size(); }
+  std::size_t brick_count() const { return memory_.count; }  ///< Of all levels.
 
-  /// Coordinates (voxel index / 8) of the bricks in memory, ordered by x, then y, then z. A brick is in memory if an
-  /// active voxel is at a corner of one of its cells or, of a cubic field, if a coefficient that one of its cells needs
-  /// is not zero.
-  const std::vector<Eigen::Vector3i>& bricks() const { return bricks_; }
+  /// Coordinates (voxel index / 8) of the bricks of level 0 in memory, ordered by x, then y, then z. A brick is in
+  /// memory if an active voxel is at a corner of one of its cells or, of a cubic field, if a coefficient that one of
+  /// its cells needs is not zero, or if it is refined.
+  const std::vector<Eigen::Vector3i>& bricks() const { return bricks_[0].places; }
+
+  /// The bricks of all levels. In those that are refined, `strongest` is a bound of the bricks within them, too.
+  const std::vector<BrickList>& bricks_of_levels() const { return bricks_; }
   std::size_t memory_bytes() const;
 
   const BrickMemory& memory() const { return memory_; }
@@ -154,19 +163,22 @@ class TensorField {
   void keep_with_bricks(std::shared_ptr<const void> other);
 
   /// The brick whose first cell is at `brick` * 8. It is the brick of zeros wherever no brick is in memory, also
-  /// outside the extent.
+  /// outside the extent. It is of level 0; where it is refined, its `strongest` is a bound of all finer bricks within.
   TensorBrick brick(const Eigen::Vector3i& brick) const {
     const BrickIndex::Entry entry = index_.entry(brick);
     return brick_at(entry.number == BrickIndex::missing ? zeros : memory_.brick(entry.number), entry.value);
   }
 
   /// Number of levels; 1 if all voxels have one size.
-  int levels() const { return 1; }
+  int levels() const { return static_cast<int>(bricks_.size()); }
 
   /// The brick of the finest level that holds a point. It may be the brick of zeros.
   /// @param at  The brick of level 0. @param position  From its first voxel, in voxels of level 0; what is outside of
   /// the brick is taken as on its faces.
-  LeafBrick leaf(const Eigen::Vector3i& at, const std::array<float, 3>& /*position*/) const { return {brick(at)}; }
+  LeafBrick leaf(const Eigen::Vector3i& at, const std::array<float, 3>& position) const {
+    if (families_.empty()) return {brick(at)};
+    return leaf_within(index_.entry(at), position);
+  }
 
   /// Whether the brick is in memory. If not, `brick` returns the brick of zeros.
   bool is_stored(const Eigen::Vector3i& brick) const { return index_.find(brick) != BrickIndex::missing; }
@@ -174,7 +186,10 @@ class TensorField {
  private:
   static const float* const zeros;  // A brick of either kind.
 
-  void set_trailing_offset();
+  using Family = std::array<BrickIndex::Entry, 8>;  ///< The bricks within a refined one: x slowest, z fastest.
+
+  void make_indices();
+  LeafBrick leaf_within(BrickIndex::Entry entry, const std::array<float, 3>& position) const;
   TensorBrick brick_at(const float* floats, float strongest) const {
     return {floats, floats + trailing_offset_, strongest, memory_.components};
   }
@@ -182,12 +197,15 @@ class TensorField {
   Interpolant interpolant_;
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
-  std::vector<Eigen::Vector3i> bricks_;
-  BrickMemory memory_;  ///< In the order of `bricks_`.
+  std::vector<BrickList> bricks_;  ///< Of each level.
+  BrickMemory memory_;             ///< In the order of `bricks_`.
   std::shared_ptr<const TriangleMesh> surface_;
   std::size_t trailing_offset_ = 0;
   double max_norm_ = 0;
-  BrickIndex index_;  ///< Finds a brick, and its TensorBrick::strongest, by its coordinates.
+  BrickIndex index_;  ///< Finds a brick of level 0, and its TensorBrick::strongest, by its coordinates.
+
+  std::vector<Family> families_;
+  std::vector<std::uint32_t> family_of_;  ///< By the number of a brick in memory; BrickIndex::missing: not refined.
 };
 
 }  // namespace tensorray

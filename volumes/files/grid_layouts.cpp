@@ -4,6 +4,7 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 namespace {
@@ -227,29 +228,82 @@ FieldGrids given_grids(const std::filesystem::path& path, const std::vector<Grid
   if (of_vector ? !ComponentGrids{given.tensor, {}}.empty() : !ComponentGrids{{}, given.vector}.empty())
     fail_components(path, of_vector ? "with `derive` \"gradient\", give `x`, `y` and `z`"
                                     : "`x`, `y` and `z` are of a vector: add `derive` \"gradient\"");
-  FieldGrids field{name, of_vector ? vector_parts(path, given.vector) : tensor_parts(path, given.tensor)};
+  FieldGrids field;
+  field.name = name;
+  field.parts = of_vector ? vector_parts(path, given.vector) : tensor_parts(path, given.tensor);
   for (const FieldPart& part : field.parts) require_scalar(path, grids, part.grid);
   if (field.name.empty()) field.name = field.parts.front().grid;
   return field;
 }
 
+/// The level that a grid's name has at its end; 0: none.
+std::size_t level_in(const std::string& name) {
+  const std::size_t at = name.rfind('@');
+  if (at == std::string::npos || at + 2 != name.size() || name.back() < '1' || name.back() > '9') return 0;
+  return static_cast<std::size_t>(name.back() - '0');
+}
+
+/// The grids without those of finer levels.
+std::vector<GridInfo> coarsest(const std::vector<GridInfo>& grids) {
+  std::vector<GridInfo> result;
+  for (const GridInfo& grid : grids)
+    if (level_in(grid.name) == 0 || !find(grids, grid.name.substr(0, grid.name.size() - 2))) result.push_back(grid);
+  return result;
+}
+
+/// Adds the grids of finer levels.
+void add_finer(const std::filesystem::path& path, const std::vector<GridInfo>& grids, FieldGrids& field) {
+  for (std::size_t level = 1; level <= 9; ++level) {
+    std::vector<FieldPart> parts;
+    std::string missing;
+    for (const FieldPart& part : field.parts) {
+      const std::string name = part.grid + level_suffix(level);
+      const GridInfo *const here = find(grids, name), *const before = find(grids, part.grid);
+      if (!here)
+        missing = name;
+      else if (here->type != before->type)
+        fail(path, "grid " + name + " is " + here->type + ", and " + part.grid + " is " + before->type);
+      else
+        parts.push_back({name, part.entries});
+    }
+    if (parts.empty()) continue;
+    if (!missing.empty()) fail(path, "level " + std::to_string(level) + " of the field lacks grid " + missing);
+    if (level >= max_levels)
+      fail(path, "grid " + parts[0].grid + " is of a fifth level or more; a field has 4 at most");
+    if (level != field.finer.size() + 1)
+      fail(path, "has grid " + parts[0].grid + ", but no level " + std::to_string(level - 1) + " of the field");
+    field.finer.push_back(std::move(parts));
+  }
+}
+
 }  // namespace
+
+std::string level_suffix(std::size_t level) { return level == 0 ? "" : "@" + std::to_string(level); }
 
 bool ComponentGrids::empty() const {
   const auto none = [](const std::string& name) { return name.empty(); };
   return std::all_of(tensor.begin(), tensor.end(), none) && std::all_of(vector.begin(), vector.end(), none);
 }
 
-std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids) { return names_in(grids, tensor_layouts()); }
+std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids) {
+  return names_in(coarsest(grids), tensor_layouts());
+}
 
-FieldGrids field_grids(const std::filesystem::path& path, const std::vector<GridInfo>& grids, const std::string& name,
+FieldGrids field_grids(const std::filesystem::path& path, const std::vector<GridInfo>& all, const std::string& name,
                        Derive derive, const ComponentGrids& components) {
-  if (!components.empty()) return given_grids(path, grids, name, derive, components);
-  FieldGrids field{chosen_name(path, grids, name, derive), {}};
+  const std::vector<GridInfo> grids = coarsest(all);
+  FieldGrids field;
+  if (!components.empty()) {
+    field = given_grids(path, grids, name, derive, components);
+    add_finer(path, all, field);
+    return field;
+  }
+  field.name = chosen_name(path, grids, name, derive);
   const std::vector<Layout>& layouts = layouts_for(derive);
   const Layout& layout =
       *std::find_if(layouts.begin(), layouts.end(), [&](const Layout& l) { return has(grids, field.name, l); });
   for (const Part& part : layout.parts) field.parts.push_back({field.name + part.suffix, part.entries});
+  add_finer(path, all, field);
   return field;
 }
 

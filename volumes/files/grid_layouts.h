@@ -47,7 +47,11 @@ struct FieldPart {
 struct FieldGrids {
   std::string name;
   std::vector<FieldPart> parts;
+  std::vector<std::vector<FieldPart>> finer;  ///< Of each finer level.
 };
+
+/// What the names of the grids of a level end in: "", "@1", "@2", "@3".
+std::string level_suffix(std::size_t level);
 
 /// The names of the tensor fields among the grids of a file.
 std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids);
@@ -58,6 +62,7 @@ std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids);
 /// (NAME_0, NAME.0, NAME[0] … 8); or nine, or the six of a symmetric tensor, named by their axes (NAMExx, NAME_xx,
 /// NAME.xx, also in capitals, or by numbers from 1, or from 0: NAME11, NAME_11, ...). A vector is a Vec3 grid, or
 /// three scalar grids NAME.x, NAME_x, NAMEx, NAME[0], NAME.0, NAME_0, ...
+/// The grids of finer levels have the names of level 0, with "@1", "@2" or "@3" behind them.
 /// @throw std::runtime_error, one line that names the file, lists its grids or fields, and names the fix.
 FieldGrids field_grids(const std::filesystem::path& path, const std::vector<GridInfo>& grids, const std::string& name,
                        Derive derive, const ComponentGrids& components);

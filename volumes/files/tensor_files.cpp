@@ -1,7 +1,9 @@
 #include "volumes/files/tensor_files.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <set>
 #include <stdexcept>
@@ -66,10 +68,10 @@ std::vector<GridInfo> infos_of(const VdbFile& file) {
   return infos;
 }
 
-/// The grids of a field in a file, in the order of its parts.
-std::vector<FieldGrid> field_grids_of(const VdbFile& file, const FieldGrids& field) {
+/// The grids of a level in a file, in the order of its parts.
+std::vector<FieldGrid> field_grids_of(const VdbFile& file, const std::vector<FieldPart>& parts) {
   std::vector<FieldGrid> grids;
-  for (const FieldPart& part : field.parts)
+  for (const FieldPart& part : parts)
     for (const VdbGrid& grid : file.grids)
       if (grid.name == part.grid) grids.push_back({grid, part.entries});
   return grids;
@@ -79,23 +81,91 @@ std::vector<FieldGrid> field_grids_of(const VdbFile& file, const FieldGrids& fie
 std::set<std::string> grid_names(const FieldGrids& field) {
   std::set<std::string> names = surface_names(field.name);
   for (const FieldPart& part : field.parts) names.insert(part.grid);
+  for (const std::vector<FieldPart>& level : field.finer)
+    for (const FieldPart& part : level) names.insert(part.grid);
   return names;
 }
 
-/// The tensors that are derived from the values of grids. All of them are in memory.
-BlockSource derived_source(const std::filesystem::path& path, const std::vector<FieldGrid>& grids, Derive derive,
-                           const BlockSource& field) {
-  SampleBlocks samples(field.shapes.size());
+using Fill = std::function<void(std::size_t, TensorBlock&)>;
+
+Fill fill_of(const std::filesystem::path& path, const std::vector<FieldGrid>& grids) {
+  return [path, grids](std::size_t, TensorBlock& block) {
+    block.values.fill(Eigen::Matrix3f::Zero());  // A voxel may be active in some of the grids alone.
+    put_values(path, grids, block);
+  };
+}
+
+/// The tensors of a level that are derived from the values of grids, in memory.
+/// @param to_index  Linear part of the transform, from world to the level's index space.
+TensorBlocks derived_blocks(const std::filesystem::path& path, const std::vector<FieldGrid>& grids, Derive derive,
+                            const std::vector<BlockShape>& shapes, const Eigen::Matrix3d& to_index) {
+  SampleBlocks samples(shapes.size());
   tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
-    static_cast<BlockShape&>(samples[i]) = field.shapes[i];
+    static_cast<BlockShape&>(samples[i]) = shapes[i];
     put_values(path, grids, samples[i]);
   });
   const bool is_staggered = grids.front().file.grid->getGridClass() == openvdb::GRID_STAGGERED;
-  const Eigen::Matrix3d to_index = field.to_world.inverse().linear();
-  TensorGrid grid{field.name, field.to_world, {}, field.metadata, field.surface};
-  grid.blocks = derive == Derive::hessian ? hessian(samples, to_index)
-                : is_staggered            ? staggered_gradient(samples, to_index)
-                                          : gradient(samples, to_index);
+  return derive == Derive::hessian ? hessian(samples, to_index)
+         : is_staggered            ? staggered_gradient(samples, to_index)
+                                   : gradient(samples, to_index);
+}
+
+std::string described_level(std::size_t level) { return "level " + std::to_string(level) + " of the field"; }
+
+/// Checks where the voxels of a level are. @param source  With the levels before.
+void check_level(const std::filesystem::path& path, const BlockSource& source, const std::vector<BlockShape>& shapes) {
+  constexpr int margin = 4;  // A body may reach two voxels of level 0 beyond the extent.
+  const std::size_t level = source.finer.size() + 1;
+  if (shapes.empty()) fail(path, described_level(level) + " has no active voxel");
+  const int scale = 1 << level;
+  const auto cell_of = [&](const Eigen::Vector3i& index) { return index.cast<double>() / scale; };
+  const Eigen::AlignedBox3i extent = active_box(source.shapes), box = active_box(shapes);
+  const Eigen::Vector3d beyond =
+      (extent.min().cast<double>() - cell_of(box.min())).cwiseMax(cell_of(box.max()) - extent.max().cast<double>());
+  if (beyond.maxCoeff() > margin / 2.0)
+    fail(path, described_level(level) + " reaches beyond the extent of level 0; level 0 must be complete");
+  if (level == 1) return;
+  const auto refined_of = [](const BlockShape& shape, int levels) {
+    const Eigen::Vector3i brick = (shape.origin / TensorBlock::size).unaryExpr([&](int i) { return i >> levels; });
+    return std::array<int, 3>{brick.x(), brick.y(), brick.z()};
+  };
+  std::set<std::array<int, 3>> refined;
+  for (const BlockShape& shape : source.finer.back().shapes) refined.insert(refined_of(shape, 1));
+  for (const BlockShape& shape : shapes)
+    if (refined.count(refined_of(shape, 2)) == 0)
+      fail(path, described_level(level) + " has voxels where there is no level " + std::to_string(level - 1) +
+                     ", in the block at " + std::to_string(shape.origin.x()) + " " + std::to_string(shape.origin.y()) +
+                     " " + std::to_string(shape.origin.z()));
+}
+
+/// Adds the finer levels of a field. @throw std::runtime_error if they do not fit to those before.
+void add_levels(const std::filesystem::path& path, const VdbFile& file, const FieldGrids& field, Derive derive,
+                BlockSource& source) {
+  for (const std::vector<FieldPart>& parts : field.finer) {
+    const std::vector<FieldGrid> grids = field_grids_of(file, parts);
+    const std::size_t level = source.finer.size() + 1;
+    const Eigen::Affine3d right = to_world_of_level(source.to_world, static_cast<int>(level));
+    if (!same_transform(right, common_transform(path, grids)))
+      fail(path, "grid " + parts.front().grid + " must have the transform of level 0 with voxels of 1/" +
+                     std::to_string(1 << level) + " of their size, and the same centre of voxel 0");
+    const std::size_t bytes = derive != Derive::none ? sizeof(SampleBlock) : min_brick_bytes;
+    std::vector<BlockShape> shapes = find_blocks(path, grids, bytes);
+    check_level(path, source, shapes);
+    source.finer.push_back({std::move(shapes), fill_of(path, grids)});
+  }
+}
+
+/// The derived tensors of all levels, in memory.
+BlockSource derived_source(const std::filesystem::path& path, const VdbFile& file, const FieldGrids& field,
+                           Derive derive, const BlockSource& source) {
+  const auto blocks_of_level = [&](std::size_t level, const auto& parts, const auto& shapes) {
+    const Eigen::Affine3d to_world = to_world_of_level(source.to_world, static_cast<int>(level));
+    return derived_blocks(path, field_grids_of(file, parts), derive, shapes, to_world.inverse().linear());
+  };
+  TensorGrid grid{source.name, source.to_world, {}, source.metadata, source.surface};
+  grid.blocks = blocks_of_level(0, field.parts, source.shapes);
+  for (std::size_t i = 0; i < field.finer.size(); ++i)
+    grid.finer.push_back(blocks_of_level(i + 1, field.finer[i], source.finer[i].shapes));
   return source_of(std::move(grid));
 }
 
@@ -103,26 +173,27 @@ BlockSource derived_source(const std::filesystem::path& path, const std::vector<
   fail(path, "the active voxels of \"" + field + "\" do not fit in memory; resample it more coarsely");
 }
 
-/// One row of the tensors of a grid, which must outlive it, as a grid of vectors that is only for writing: its leaves
-/// have masks, and get their values when they are written, one at a time.
+/// One row of the tensors of a level of a grid, which must outlive it, as a grid of vectors that is only for writing:
+/// its leaves have masks, and get their values when they are written, one at a time.
 class RowGrid : public openvdb::Vec3SGrid {
  public:
   using Leaf = openvdb::Vec3STree::LeafNodeType;
 
-  RowGrid(const TensorGrid& grid, int row, bool is_half) : row_(row) {
-    setName(grid.name + "_row" + std::to_string(row));
-    place(*this, grid.to_world);
+  RowGrid(const TensorGrid& grid, std::size_t level, int row, bool is_half) : row_(row) {
+    setName(grid.name + "_row" + std::to_string(row) + level_suffix(level));
+    place(*this, to_world_of_level(grid.to_world, static_cast<int>(level)));
     setGridClass(openvdb::GRID_UNKNOWN);
     setVectorType(openvdb::VEC_INVARIANT);
     setSaveFloatAsHalf(is_half);
     for (const auto& [key, value] : grid.metadata)
       if (!(*this)[key] && key != length_unit_key)
         insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, type, ...
-    const std::vector<BlockShape> shapes = grid.shapes();
+    const TensorBlocks& blocks = *levels_of(grid)[level];
+    const std::vector<BlockShape> shapes = shapes_of(blocks);
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       auto* const leaf = new Leaf(openvdb::PartialCreate(), coord_of(shapes[i].origin));
       tree().addLeaf(leaf);  // The tree owns it.
-      blocks_.emplace(leaf, &grid.blocks[i]);
+      blocks_.emplace(leaf, &blocks[i]);
       for (int offset = 0; offset < TensorBlock::voxels; ++offset)
         leaf->setActiveState(static_cast<openvdb::Index>(offset), shapes[i].active[offset]);
     }
@@ -155,11 +226,12 @@ class RowGrid : public openvdb::Vec3SGrid {
 };
 
 void check_half_range(const std::filesystem::path& path, const TensorGrid& grid) {
-  tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
-    for (const Eigen::Matrix3f& value : grid.blocks[i].values)
-      if ((value.array().abs() > max_half).any())
-        fail(path, "a component exceeds 65504, the greatest 16-bit float; write single precision or scale the field");
-  });
+  for (const TensorBlocks* blocks : levels_of(grid))
+    tbb::parallel_for(std::size_t{0}, blocks->size(), [&](std::size_t i) {
+      for (const Eigen::Matrix3f& value : (*blocks)[i].values)
+        if ((value.array().abs() > max_half).any())
+          fail(path, "a component exceeds 65504, the greatest 16-bit float; write single precision or scale the field");
+    });
 }
 
 /// The first active voxel. @param grid  Of tensors, or numbers.
@@ -196,7 +268,7 @@ BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string
                             const ComponentGrids& components) {
   const FieldGrids field = field_grids(path, list_vdb(path), name, derive, components);
   const VdbFile file = read_vdb(path, grid_names(field));
-  const std::vector<FieldGrid> grids = field_grids_of(file, field);
+  const std::vector<FieldGrid> grids = field_grids_of(file, field.parts);
   BlockSource result;
   result.name = field.name;
   result.to_world = common_transform(path, grids);
@@ -206,14 +278,12 @@ BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string
     result.surface = read_surface(path, file, field.name, result.to_world);
     result.shapes = find_blocks(path, grids, derives ? sizeof(SampleBlock) : min_brick_bytes);
     if (result.shapes.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
-    if (derives) return derived_source(path, grids, derive, result);
+    add_levels(path, file, field, derive, result);
+    if (derives) return derived_source(path, file, field, derive, result);
   } catch (const std::bad_alloc&) {
     fail_too_large(path, result.name);
   }
-  result.fill = [path, grids](std::size_t, TensorBlock& block) {
-    block.values.fill(Eigen::Matrix3f::Zero());  // A voxel may be active in some of the grids alone.
-    put_values(path, grids, block);
-  };
+  result.fill = fill_of(path, grids);
   return result;
 }
 
@@ -230,7 +300,8 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
 void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool is_half) {
   if (is_half) check_half_range(path, grid);
   openvdb::GridPtrVec rows;
-  for (int row = 0; row < 3; ++row) rows.push_back(std::make_shared<RowGrid>(grid, row, is_half));
+  for (std::size_t level = 0; level <= grid.finer.size(); ++level)
+    for (int row = 0; row < 3; ++row) rows.push_back(std::make_shared<RowGrid>(grid, level, row, is_half));
   for (const auto& part : surface_grids(grid.surface, grid.name, grid.to_world, first_voxel(grid)))
     rows.push_back(part);
   openvdb::MetaMap metadata;

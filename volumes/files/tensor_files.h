@@ -22,7 +22,8 @@ namespace tensorray {
 /// are taken from the first grid. Values that are not finite are kept: see remove_non_finite.
 /// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, no such field
 /// (the message lists the grids of the file), several fields and no name, rows with different transforms, a transform
-/// that is not affine, no active voxel. Damage within the values of voxels shows when blocks are read.
+/// that is not affine, no active voxel, levels that do not fit to each other. Damage within the values of voxels shows
+/// when blocks are read.
 BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string& name = "",
                             Derive derive = Derive::none, const ComponentGrids& components = {});
 
@@ -32,7 +33,8 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
 
 /// Writes the rows of a field as three Vec3S grids NAME_row0 … NAME_row2 with vector type "invariant" and one
 /// transform; its surface, if it has one, as two more (surface_grids.h). Writes the grid's metadata on the file and on
-/// each grid. Equal grids give equal bytes. Writes the file in place, block by block, so that memory does not hold the
+/// each grid. Finer levels are grids of the same layout, NAME_row0@1 … with half, a quarter, … of the voxel size.
+/// Equal grids give equal bytes. Writes the file in place, block by block, so that memory does not hold the
 /// field twice.
 /// @param half  Store 16-bit floats: three significant digits between 6e-5 and 65504, steps of 6e-8 below.
 /// @throw std::runtime_error naming the file and the reason (also when the disk is full; with `half`, when a value

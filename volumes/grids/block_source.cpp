@@ -1,5 +1,7 @@
 #include "volumes/grids/block_source.h"
 
+#include <array>
+#include <map>
 #include <memory>
 #include <utility>
 
@@ -39,11 +41,16 @@ void fill_block(TensorBlock& block, const std::function<Eigen::Matrix3d(const Ei
 
 }  // namespace
 
-void read_block(const BlockSource& source, std::size_t i, TensorBlock& block) {
-  block.origin = source.shapes[i].origin;
-  block.active = source.shapes[i].active;
+void read_block(const BlockShape& shape, const std::function<void(std::size_t, TensorBlock&)>& fill, std::size_t i,
+                TensorBlock& block) {
+  block.origin = shape.origin;
+  block.active = shape.active;
   if (!block.active.all()) block.values.fill(Eigen::Matrix3f::Zero());
-  source.fill(i, block);
+  fill(i, block);
+}
+
+void read_block(const BlockSource& source, std::size_t i, TensorBlock& block) {
+  read_block(source.shapes[i], source.fill, i, block);
 }
 
 BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
@@ -55,28 +62,54 @@ BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& 
   return source;
 }
 
+std::vector<BlockShape> shapes_within(const std::vector<Eigen::Vector3i>& bricks, const Eigen::AlignedBox3i& extent) {
+  std::map<std::array<int, 3>, std::bitset<TensorBlock::voxels>> found;
+  for (const Eigen::Vector3i& brick : bricks) {
+    Eigen::AlignedBox3i box(2 * size * brick, (2 * size * brick).array() + 2 * size);  // With its last faces.
+    for (int axis = 0; axis < 3; ++axis)
+      if (box.max()[axis] != extent.max()[axis]) --box.max()[axis];
+    box = box.intersection(extent);
+    for (const BlockShape& shape : dense_shapes(box))
+      found[{shape.origin.x(), shape.origin.y(), shape.origin.z()}] |= shape.active;
+  }
+  std::vector<BlockShape> shapes;
+  for (const auto& [origin, active] : found) shapes.push_back({{origin[0], origin[1], origin[2]}, active});
+  return shapes;
+}
+
 BlockSource view_of(const TensorGrid& grid) {
-  BlockSource source{grid.name, grid.to_world, grid.shapes(), grid.metadata, grid.surface, {}};
-  source.fill = [&grid](std::size_t i, TensorBlock& block) { block.values = grid.blocks[i].values; };
+  const auto fill_from = [](const TensorBlocks& blocks) {
+    return [&blocks](std::size_t i, TensorBlock& block) { block.values = blocks[i].values; };
+  };
+  BlockSource source{grid.name, grid.to_world, grid.shapes(), grid.metadata, grid.surface, fill_from(grid.blocks)};
+  for (const TensorBlocks& blocks : grid.finer) source.finer.push_back({shapes_of(blocks), fill_from(blocks)});
   return source;
 }
 
 BlockSource source_of(TensorGrid grid) {
   const auto kept = std::make_shared<const TensorGrid>(std::move(grid));
   BlockSource source = view_of(*kept);
-  source.fill = [kept, fill = source.fill](std::size_t i, TensorBlock& block) { fill(i, block); };
+  const auto keep = [&kept](auto& fill) {
+    fill = [kept, from = fill](std::size_t i, TensorBlock& block) { from(i, block); };
+  };
+  keep(source.fill);
+  for (BlockLevel& level : source.finer) keep(level.fill);
   return source;
 }
 
 TensorGrid to_grid(const BlockSource& source) {
+  const auto read = [](const std::vector<BlockShape>& shapes, const auto& fill) {
+    TensorBlocks blocks = unset_blocks(shapes.size());
+    tbb::parallel_for(std::size_t{0}, shapes.size(), [&](std::size_t i) { read_block(shapes[i], fill, i, blocks[i]); });
+    return blocks;
+  };
   TensorGrid grid;
   grid.name = source.name;
   grid.to_world = source.to_world;
   grid.metadata = source.metadata;
   grid.surface = source.surface;
-  grid.blocks = unset_blocks(source.shapes.size());
-  tbb::parallel_for(std::size_t{0}, source.shapes.size(),
-                    [&](std::size_t i) { read_block(source, i, grid.blocks[i]); });
+  grid.blocks = read(source.shapes, source.fill);
+  for (const BlockLevel& level : source.finer) grid.finer.push_back(read(level.shapes, level.fill));
   return grid;
 }
 

@@ -37,10 +37,18 @@ struct BlockSource {
 /// Empties `block`, and fills it with block i of `source`.
 void read_block(const BlockSource& source, std::size_t i, TensorBlock& block);
 
+/// The same from the shape of block i and what fills it (BlockSource::fill).
+void read_block(const BlockShape& shape, const std::function<void(std::size_t, TensorBlock&)>& fill, std::size_t i,
+                TensorBlock& block);
+
 /// A dense grid: `value(index)` at every index of `box` (inclusive), all active. `value` may be called from several
 /// threads at once.
 BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
                          const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value);
+
+/// The blocks of a finer level in some bricks of the level before: all voxels there, also on the extent's last faces.
+/// @param extent  Of the level's voxels.
+std::vector<BlockShape> shapes_within(const std::vector<Eigen::Vector3i>& bricks, const Eigen::AlignedBox3i& extent);
 
 /// The blocks of a grid, which must outlive them; or which they keep in memory.
 BlockSource view_of(const TensorGrid& grid);

@@ -52,12 +52,28 @@ Eigen::AlignedBox3i active_box(const std::vector<BlockShape>& shapes) {
   return box;
 }
 
-std::vector<BlockShape> TensorGrid::shapes() const {
+Eigen::Affine3d to_world_of_level(const Eigen::Affine3d& to_world, int level) {
+  return to_world * Eigen::Scaling(std::ldexp(1.0, -level));
+}
+
+std::vector<BlockShape> shapes_of(const TensorBlocks& blocks) {
   std::vector<BlockShape> result(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     result[i] = {blocks[i].origin, blocks[i].active};
   });
   return result;
+}
+
+std::vector<TensorBlocks*> levels_of(TensorGrid& grid) {
+  std::vector<TensorBlocks*> levels{&grid.blocks};
+  for (TensorBlocks& blocks : grid.finer) levels.push_back(&blocks);
+  return levels;
+}
+
+std::vector<const TensorBlocks*> levels_of(const TensorGrid& grid) {
+  std::vector<const TensorBlocks*> levels{&grid.blocks};
+  for (const TensorBlocks& blocks : grid.finer) levels.push_back(&blocks);
+  return levels;
 }
 
 TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
@@ -76,15 +92,20 @@ std::size_t remove_non_finite(TensorBlock& block) {
   return before - block.active.count();
 }
 
-void remove_empty_blocks(TensorGrid& grid) {
+void remove_empty_blocks(TensorBlocks& blocks) {
   const auto is_empty = [](const TensorBlock& block) { return block.active.none(); };
-  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(), is_empty), grid.blocks.end());
+  blocks.erase(std::remove_if(blocks.begin(), blocks.end(), is_empty), blocks.end());
+}
+
+void remove_empty_blocks(TensorGrid& grid) {
+  for (TensorBlocks* blocks : levels_of(grid)) remove_empty_blocks(*blocks);
 }
 
 std::size_t remove_non_finite(TensorGrid& grid) {
   std::atomic<std::size_t> removed{0};
-  tbb::parallel_for(std::size_t{0}, grid.blocks.size(),
-                    [&](std::size_t i) { removed += remove_non_finite(grid.blocks[i]); });
+  for (TensorBlocks* blocks : levels_of(grid))
+    tbb::parallel_for(std::size_t{0}, blocks->size(),
+                      [&](std::size_t i) { removed += remove_non_finite((*blocks)[i]); });
   remove_empty_blocks(grid);
   return removed;
 }
@@ -110,10 +131,12 @@ AsymmetrySums asymmetry_sums(const TensorBlock& block) {
 }
 
 double asymmetry(const TensorGrid& grid) {
-  std::vector<AsymmetrySums> blocks(grid.blocks.size());
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) { blocks[i] = asymmetry_sums(grid.blocks[i]); });
   AsymmetrySums all;  // Summed in the order of the blocks: the result does not depend on the number of threads.
-  for (const AsymmetrySums& block : blocks) all.add(block);
+  for (const TensorBlocks* blocks : levels_of(grid)) {
+    std::vector<AsymmetrySums> sums(blocks->size());
+    tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t i) { sums[i] = asymmetry_sums((*blocks)[i]); });
+    for (const AsymmetrySums& block : sums) all.add(block);
+  }
   return all.asymmetry();
 }
 

@@ -50,11 +50,19 @@ std::size_t active_voxels(const std::vector<BlockShape>& shapes);
 /// Index box from the least to the greatest active voxel; isEmpty() where there is none.
 Eigen::AlignedBox3i active_box(const std::vector<BlockShape>& shapes);
 
+/// Levels that a field may have.
+constexpr int max_levels = 4;
+
 using TensorBlocks = std::deque<TensorBlock, SlotAllocator<TensorBlock>>;
 
 /// `count` blocks without active voxels; `unset_blocks`: blocks whose values are not set.
 TensorBlocks make_blocks(std::size_t count);
 TensorBlocks unset_blocks(std::size_t count);
+
+/// From voxel indices of a level to world. @param to_world  Of level 0.
+Eigen::Affine3d to_world_of_level(const Eigen::Affine3d& to_world, int level);
+
+std::vector<BlockShape> shapes_of(const TensorBlocks& blocks);  ///< In their order.
 
 /// A sparse grid of tensors. Plain data; voxel (i, j, k) has its centre at `to_world` * (i, j, k).
 struct TensorGrid {
@@ -66,13 +74,18 @@ struct TensorGrid {
 
   /// The voxels of finer levels, where there are any: voxel (i, j, k) of level l, which is finer[l − 1], has its centre
   /// at `to_world` * (i, j, k) / 2^l. The field is refined in the bricks of 8³ cells of the level before in which a
-  /// voxel of the level is active.
+  /// voxel of the level is active. What is outside of the bricks of the level before, or outside the extent of level
+  /// 0, is left out.
   std::vector<TensorBlocks> finer = {};
 
-  std::vector<BlockShape> shapes() const;  ///< Of all blocks, in their order.
+  std::vector<BlockShape> shapes() const { return shapes_of(blocks); }  ///< Of level 0.
   std::size_t active_voxels() const { return tensorray::active_voxels(shapes()); }
   Eigen::AlignedBox3i active_box() const { return tensorray::active_box(shapes()); }
 };
+
+/// The blocks of all levels, the coarsest first.
+std::vector<TensorBlocks*> levels_of(TensorGrid& grid);
+std::vector<const TensorBlocks*> levels_of(const TensorGrid& grid);
 
 /// Numbers at 8³ voxels, in the order of a TensorBlock. Inactive voxels hold zero.
 struct ScalarBlock : BlockShape {
@@ -94,11 +107,12 @@ struct ScalarGrid {
 TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
                       const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value);
 
-/// Removes blocks that have no active voxel.
+/// Removes blocks that have no active voxel, of all levels.
+void remove_empty_blocks(TensorBlocks& blocks);
 void remove_empty_blocks(TensorGrid& grid);
 
 /// Sets voxels that are not finite to zero and inactive, so that light goes straight there, and removes blocks that
-/// have no active voxel left. Runs on all threads.
+/// have no active voxel left, of all levels. Runs on all threads.
 /// @return the number of voxels that were not finite.
 std::size_t remove_non_finite(TensorGrid& grid);
 
@@ -115,7 +129,7 @@ struct AsymmetrySums {
 
 AsymmetrySums asymmetry_sums(const TensorBlock& block);
 
-/// The asymmetry of all active voxels. Runs on all threads; the result does not depend on their number.
+/// The asymmetry of all active voxels, of all levels. Runs on all threads; the result does not depend on their number.
 double asymmetry(const TensorGrid& grid);
 
 /// A field whose `asymmetry` is below this counts as symmetric: rounding to single precision can cause that much.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <utility>
 #include <vector>
 
@@ -36,11 +37,18 @@ Eigenvalues guess(const BlockSource& source) {
   return automatic_choice(sums.asymmetry());
 }
 
+/// What a pass finds in the blocks of a level, in their order.
+struct LevelFindings {
+  std::vector<BlockShape> shapes;  // Of finite voxels.
+  std::vector<BlockFindings> blocks;
+
+  explicit LevelFindings(const std::vector<BlockShape>& all) : shapes(all), blocks(all.size()) {}
+};
+
 /// One pass over the blocks.
 struct Pass {
-  BlockSource source;              // `fill` cleans and preprocesses; it changes `shapes` where a voxel is not finite.
-  std::vector<BlockShape> shapes;  // Of finite voxels.
-  std::vector<BlockFindings> blocks;  // In the order of the blocks.
+  BlockSource source;  // `fill` cleans and preprocesses; it changes `shapes` where a voxel is not finite.
+  std::deque<LevelFindings> levels;
 
   Pass(const BlockSource& original, Eigenvalues mode, Eigenvalues chosen);
   Pass(const Pass&) = delete;
@@ -49,42 +57,53 @@ struct Pass {
   BlockFindings sum() const;
 };
 
-Pass::Pass(const BlockSource& original, Eigenvalues mode, Eigenvalues chosen)
-    : source(original), shapes(original.shapes), blocks(original.shapes.size()) {
-  source.fill = [this, fill = original.fill, mode, chosen](std::size_t i, TensorBlock& block) {
-    BlockFindings& found = blocks[i];
-    fill(i, block);
-    found.non_finite = remove_non_finite(block);
-    shapes[i].active = block.active;
-    if (mode == Eigenvalues::automatic) found.asymmetry = asymmetry_sums(block);
-    if (chosen != Eigenvalues::raw) found.eigenvalues = apply_eigenvalues(block, chosen);
+Pass::Pass(const BlockSource& original, Eigenvalues mode, Eigenvalues chosen) : source(original) {
+  const auto watch = [&](const std::vector<BlockShape>& shapes, auto& fill) {
+    levels.emplace_back(shapes);
+    fill = [level = &levels.back(), fill, mode, chosen](std::size_t i, TensorBlock& block) {
+      BlockFindings& found = level->blocks[i];
+      fill(i, block);
+      found.non_finite = remove_non_finite(block);
+      level->shapes[i].active = block.active;
+      if (mode == Eigenvalues::automatic) found.asymmetry = asymmetry_sums(block);
+      if (chosen != Eigenvalues::raw) found.eigenvalues = apply_eigenvalues(block, chosen);
+    };
   };
+  watch(original.shapes, source.fill);
+  for (BlockLevel& level : source.finer) watch(level.shapes, level.fill);
 }
 
 /// In the order of the blocks, so that the number of threads does not matter.
 BlockFindings Pass::sum() const {
   BlockFindings all;
-  for (const BlockFindings& block : blocks) {
-    all.non_finite += block.non_finite;
-    all.asymmetry.add(block.asymmetry);
-    all.eigenvalues.add(block.eigenvalues);
-  }
+  for (const LevelFindings& level : levels)
+    for (const BlockFindings& block : level.blocks) {
+      all.non_finite += block.non_finite;
+      all.asymmetry.add(block.asymmetry);
+      all.eigenvalues.add(block.eigenvalues);
+    }
   return all;
 }
 
-/// The same blocks with other shapes; those without active voxels are left out.
-BlockSource with_shapes(const BlockSource& source, const std::vector<BlockShape>& shapes) {
-  BlockSource result = source;
-  result.shapes.clear();
+/// Gives the blocks other shapes; those without active voxels are left out.
+template <class Fill>
+void set_shapes(const std::vector<BlockShape>& from, std::vector<BlockShape>& shapes, Fill& fill) {
+  shapes.clear();
   std::vector<std::size_t> numbers;
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
-    if (shapes[i].active.none()) continue;
-    result.shapes.push_back(shapes[i]);
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    if (from[i].active.none()) continue;
+    shapes.push_back(from[i]);
     numbers.push_back(i);
   }
-  result.fill = [fill = source.fill, numbers = std::move(numbers)](std::size_t i, TensorBlock& block) {
-    fill(numbers[i], block);
-  };
+  fill = [fill, numbers = std::move(numbers)](std::size_t i, TensorBlock& block) { fill(numbers[i], block); };
+}
+
+/// The same blocks without the voxels that are not finite.
+BlockSource with_finite(const BlockSource& source, const Pass& pass) {
+  BlockSource result = source;
+  set_shapes(pass.levels[0].shapes, result.shapes, result.fill);
+  for (std::size_t i = 0; i < result.finer.size(); ++i)
+    set_shapes(pass.levels[i + 1].shapes, result.finer[i].shapes, result.finer[i].fill);
   return result;
 }
 
@@ -112,12 +131,21 @@ struct Comparison {
   double difference = -1, norm = 0;
 };
 
+/// LeafBrick::scale in the cell that begins at a voxel of level 0.
+double scale_at(const TensorField& field, const Vector3i& voxel) {
+  const Vector3i brick = voxel.unaryExpr([](int i) { return i >> 3; });
+  const Eigen::Vector3f from = (voxel - TensorBlock::size * brick).cast<float>();
+  return double{field.leaf(brick, {from.x(), from.y(), from.z()}).scale};
+}
+
+/// @param first  A voxel of level 0, at which the cell of the finest level begins.
 Comparison compare(TensorSampler& sampler, const TensorField& field, const Vector3i& first) {
   const auto at = [&](const Eigen::Vector3d& index) { return sampler.at(field.to_world() * index); };
   const Eigen::Vector3d index = first.cast<double>();
+  const double cell = 1 / scale_at(field, first);
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < 8; ++i) mean += at(index + corner_of_cell(i).cast<double>()) / 8;
-  const Eigen::Matrix3d cubic = at(index + Eigen::Vector3d::Constant(0.5));
+  for (int i = 0; i < 8; ++i) mean += at(index + cell * corner_of_cell(i).cast<double>()) / 8;
+  const Eigen::Matrix3d cubic = at(index + Eigen::Vector3d::Constant(cell / 2));
   return {(mean - cubic).norm(), cubic.norm()};
 }
 
@@ -166,9 +194,10 @@ MadeField make_field(const BlockSource& source, Eigenvalues mode, const Interpol
     result.field.reset();  // Its memory is needed.
     result.non_finite += found.non_finite;
     chosen = right;
-    current = with_shapes(current, pass.shapes);
+    current = with_finite(current, pass);
   }
   result.voxels = active_voxels(current.shapes);
+  for (const BlockLevel& level : current.finer) result.finer_voxels.push_back(active_voxels(level.shapes));
   if (result.field && result.field->is_cubic()) result.resolution = measure_resolution(*result.field, current.shapes);
   return result;
 }

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/tensors/eigenvalues.h"
@@ -26,9 +27,10 @@ inline bool is_coarse(const Resolution& resolution) { return resolution.percenti
 struct MadeField {
   std::optional<TensorField> field;  ///< Nothing if no voxel is finite.
   EigenvalueReport eigenvalues;
-  Resolution resolution;       ///< Of a cubic field.
-  std::size_t voxels = 0;      ///< Active voxels of the field.
-  std::size_t non_finite = 0;  ///< Active voxels that were not finite and are not in the field.
+  Resolution resolution;                  ///< Of a cubic field.
+  std::size_t voxels = 0;                 ///< Active voxels of level 0.
+  std::vector<std::size_t> finer_voxels;  ///< Of each finer level.
+  std::size_t non_finite = 0;             ///< Active voxels that were not finite and are not in the field.
 };
 
 /// The field of `TensorField` after remove_non_finite and apply_eigenvalues, bit for bit. Runs on all threads. Blocks

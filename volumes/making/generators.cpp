@@ -196,7 +196,8 @@ std::string source_of(Generator generator, const GridSettings& grid) {
     source += std::string(" ") + key + "=" + text(member);
   };
   std::visit([&](auto& g) { describe(g, add); }, generator);
-  return source + " resolution=" + text(grid.resolution) + " min=" + text(grid.min) + " max=" + text(grid.max);
+  source += " resolution=" + text(grid.resolution) + " min=" + text(grid.min) + " max=" + text(grid.max);
+  return grid.levels == 1 ? source : source + " levels=" + std::to_string(grid.levels);
 }
 
 bool is_point_load(const Generator& generator) {
@@ -209,6 +210,32 @@ auto sampler_of(const Kind& g, const GridSettings& grid) {
   constexpr bool is_load = std::is_same_v<Kind, PointLoad> || std::is_same_v<Kind, TwoPointLoad>;
   const Vector3d origin = is_load ? load_position(grid) : Vector3d(0, 0, 0);
   return [g, origin](const Vector3d& position) { return sample(g, Vector3d(position - origin)); };
+}
+
+/// Where the loads of a generator are, index space.
+std::vector<Vector3d> loads_of(const Generator& generator, const GridSettings& grid, const Eigen::Affine3d& to_index) {
+  const Vector3d middle = load_position(grid);
+  if (std::holds_alternative<PointLoad>(generator)) return {to_index * middle};
+  const auto* two = std::get_if<TwoPointLoad>(&generator);
+  require(two, "levels: only point_load and two_point_load are refined, towards the load");
+  const Vector3d half = two->separation / 2 * Vector3d::UnitX();
+  return {to_index * Vector3d(middle - half), to_index * Vector3d(middle + half)};
+}
+
+/// The bricks within a box of voxels that are nearer to a load than their edge. @param loads  In voxels of the level.
+std::vector<Eigen::Vector3i> bricks_near(const std::vector<Vector3d>& loads, const Eigen::AlignedBox3i& box) {
+  constexpr int edge = TensorBlock::size;
+  std::vector<Eigen::Vector3i> bricks;
+  for (const Vector3d& load : loads) {
+    const Eigen::Vector3i middle = (load / edge).array().floor().cast<int>();
+    for (int n = 0; n < 27; ++n) {
+      const Eigen::Vector3i brick = middle + Eigen::Vector3i(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
+      const Eigen::AlignedBox3i cells(edge * brick, edge * brick + Eigen::Vector3i::Constant(edge));
+      if (cells.cast<double>().exteriorDistance(load) < edge && !cells.intersection(box).isEmpty())
+        bricks.push_back(brick);
+    }
+  }
+  return bricks;
 }
 
 template <std::size_t... I>
@@ -258,15 +285,29 @@ GridSettings default_grid(const Generator& generator, int resolution) {
 BlockSource generator_source(const Generator& generator, const GridSettings& grid) {
   Generator checked = generator;
   check_generator(checked);
+  require(grid.levels >= 1 && grid.levels <= max_levels, "levels must be 1 to 4");
   const Eigen::Affine3d to_world = grid_to_world(grid, voxel_sizes(grid));
   const Eigen::AlignedBox3i box(Eigen::Vector3i::Zero(), Eigen::Vector3i(grid.resolution.array() - 1));
-  BlockSource result = std::visit(
-      [&](const auto& g) {
-        return dense_source(box, to_world, [sampled = sampler_of(g, grid), to_world](const Eigen::Vector3i& index) {
-          return sampled(to_world * index.cast<double>());
-        });
-      },
-      checked);
+  const auto source_of_box = [&](const Eigen::AlignedBox3i& voxels, const Eigen::Affine3d& transform) {
+    return std::visit(
+        [&](const auto& g) {
+          return dense_source(voxels, transform,
+                              [sampled = sampler_of(g, grid), transform](const Eigen::Vector3i& index) {
+                                return sampled(transform * index.cast<double>());
+                              });
+        },
+        checked);
+  };
+  BlockSource result = source_of_box(box, to_world);
+  Eigen::AlignedBox3i coarse = box;
+  for (int level = 1; level < grid.levels; ++level) {
+    const Eigen::Affine3d before = to_world_of_level(to_world, level - 1),
+                          transform = to_world_of_level(to_world, level);
+    const Eigen::AlignedBox3i voxels(2 * coarse.min(), 2 * coarse.max());
+    const std::vector<Eigen::Vector3i> bricks = bricks_near(loads_of(checked, grid, before.inverse()), coarse);
+    result.finer.push_back({shapes_within(bricks, voxels), source_of_box(box, transform).fill});
+    coarse = voxels;
+  }
   result.name = kind_of(generator);
   result.metadata["tensorray:field"] = result.name;
   result.metadata["tensorray:units"] = "1/length";

@@ -18,6 +18,7 @@ struct GridSettings {
   Eigen::Vector3i resolution{64, 64, 64};  ///< Voxels along x, y, z; >= 1, and 1 where the box has no thickness.
   Eigen::Vector3d min{-1, -1, -1};         ///< Corner with the least coordinates, world units.
   Eigen::Vector3d max{1, 1, 1};            ///< Corner with the greatest coordinates, world units; >= min.
+  int levels = 1;                          ///< Of a point load: each refines the bricks that are near the load.
 };
 
 // The parameters of each generator: plain data with defaults. `describe`, below, names them for scene files,
@@ -157,7 +158,7 @@ void require_memory_for(const GridSettings& grid, double bytes);
 /// it.
 TensorGrid generate(const Generator& generator, const GridSettings& grid);
 
-/// The same, block by block.
+/// The same, block by block. A brick of 8³ cells is refined if it is nearer to a load than its own edge.
 BlockSource generator_source(const Generator& generator, const GridSettings& grid);
 
 // The stress in an elastic half space under a load on its surface, in closed form. The material fills z < 0; the load

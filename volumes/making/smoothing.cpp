@@ -143,6 +143,8 @@ struct TileSmoothing {
 void smooth(TensorGrid& grid, double deviation) {
   if (!(deviation >= 0 && deviation <= max_smoothing))
     throw std::invalid_argument("smooth: the deviation must be 0 to 20 voxels");
+  if (deviation > 0 && !grid.finer.empty())
+    throw std::invalid_argument("smooth: a field of several levels is not smoothed; import it with `--levels 1`");
   const Weights weights = gaussian(deviation);
   if (radius_of(weights) == 0 || grid.blocks.empty()) return;
   const std::vector<BlockShape> shapes = grid.shapes();

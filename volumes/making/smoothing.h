@@ -14,7 +14,7 @@ constexpr double max_smoothing = 20;  ///< Voxels: a thread's memory grows with 
 /// Runs on all threads; the result does not depend on their number. Takes the memory of a second grid.
 /// @param grid       All values finite.
 /// @param deviation  σ, voxels along each axis of the grid; 0 to `max_smoothing`. Below 1/4 nothing changes.
-/// @throw std::invalid_argument if the deviation is out of range.
+/// @throw std::invalid_argument if the deviation is out of range, or the grid has several levels.
 void smooth(TensorGrid& grid, double deviation);
 
 }  // namespace tensorray

@@ -22,13 +22,31 @@ int TensorSampler::locate(const Eigen::Vector3d& world, Eigen::Vector3d& fractio
     fraction[axis] = inside - near;
   }
   const Eigen::Vector3i at(cell.x() >> 3, cell.y() >> 3, cell.z() >> 3);
-  if (at != at_) {
+  cell -= TensorBrick::cells * at;
+  if (field_->levels() > 1) {
+    find_leaf(at, cell, fraction);
+  } else if (at != at_) {
     at_ = at;
     brick_ = field_->brick(at);
   }
-  cell -= TensorBrick::cells * at;
   if (field_->is_cubic()) return CubicBrick::coefficient(cell.x() - 1, cell.y() - 1, cell.z() - 1);
   return LinearBrick::coefficient(cell.x(), cell.y(), cell.z());
+}
+
+void TensorSampler::find_leaf(const Eigen::Vector3i& at, Eigen::Vector3i& cell, Eigen::Vector3d& fraction) {
+  const Eigen::Vector3d position = cell.cast<double>() + fraction;
+  const Eigen::Array3d within = (position - first_).array();
+  if (at != at_ || !((within >= 0).all() && (within < TensorBrick::cells / scale_).all())) {
+    const LeafBrick leaf = field_->leaf(
+        at, {static_cast<float>(position.x()), static_cast<float>(position.y()), static_cast<float>(position.z())});
+    at_ = at;
+    brick_ = leaf.brick;
+    first_ = Eigen::Map<const Eigen::Vector3f>(leaf.first.data()).cast<double>();
+    scale_ = leaf.scale;
+  }
+  const Eigen::Vector3d local = (position - first_) * scale_;
+  cell = local.cast<int>().cwiseMax(0).cwiseMin(TensorBrick::cells - 1);
+  fraction = local - cell.cast<double>();
 }
 
 namespace {
@@ -170,6 +188,7 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Mat
   for (int axis = 0; axis < 3; ++axis)
     if (field_->voxels().sizes()[axis] == 0) by_index.row(axis).setZero();
   const Slopes<Eigen::Matrix3d> T = tensor_at<true>(field_->is_cubic(), brick_, first, fraction);
+  by_index *= scale_;
   for (int i = 0; i < 2; ++i) derivatives[i] = by_index(0, i) * T.x + by_index(1, i) * T.y + by_index(2, i) * T.z;
   return T.value;
 }
@@ -179,12 +198,13 @@ double TensorSampler::way_through_straight_brick(const Eigen::Vector3d& world, c
   Eigen::Vector3d unused;
   locate(world, unused);
   if (brick_.strongest > 0) return 0;
-  const Eigen::Vector3d index = field_->to_index() * world - (TensorBrick::cells * at_).cast<double>();
+  const double cells = TensorBrick::cells / scale_;
+  const Eigen::Vector3d index = field_->to_index() * world - (TensorBrick::cells * at_).cast<double>() - first_;
   const Eigen::Vector3d along = field_->to_index().linear() * direction;
   double way = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
-    if (!(index[axis] >= 0 && index[axis] <= TensorBrick::cells)) return 0;
-    if (along[axis] != 0) way = std::min(way, ((along[axis] > 0 ? TensorBrick::cells : 0) - index[axis]) / along[axis]);
+    if (!(index[axis] >= 0 && index[axis] <= cells)) return 0;
+    if (along[axis] != 0) way = std::min(way, ((along[axis] > 0 ? cells : 0) - index[axis]) / along[axis]);
   }
   return std::isfinite(way) ? way : 0;
 }

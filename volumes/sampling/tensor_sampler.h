@@ -27,19 +27,22 @@ class TensorSampler {
   Eigen::Matrix3d at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
                      std::array<Eigen::Matrix3d, 2>& derivatives);
 
-  /// The distance from `world` along `direction` to the face of the brick that contains `world`, if nothing bends light
-  /// in that brick nor in the brick that was sampled last; otherwise 0. `direction` may have any length, which is the
-  /// unit of the result.
+  /// The distance from `world` along `direction` to the face of the brick, of the finest level, that contains `world`,
+  /// if nothing bends light in that brick nor in the brick that was sampled last; otherwise 0. `direction` may have any
+  /// length, which is the unit of the result.
   double way_through_straight_brick(const Eigen::Vector3d& world, const Eigen::Vector3d& direction);
 
   std::uint64_t samples() const { return samples_; }  ///< Calls of `at` so far.
 
  private:
   int locate(const Eigen::Vector3d& world, Eigen::Vector3d& fraction);
+  void find_leaf(const Eigen::Vector3i& at, Eigen::Vector3i& cell, Eigen::Vector3d& fraction);
 
   const TensorField* field_;
   Eigen::Vector3i at_ = Eigen::Vector3i::Constant(INT32_MIN);  // Coordinates of `brick_`.
   TensorBrick brick_{};
+  Eigen::Vector3d first_ = Eigen::Vector3d::Zero();  // LeafBrick::first, and its scale.
+  double scale_ = 1;
   std::uint64_t samples_ = 0;
 };
 

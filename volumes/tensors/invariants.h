@@ -50,6 +50,7 @@ int invariant_degree(Invariant which);
 /// The invariant at every active voxel of a field, which must be finite (see remove_non_finite). The name of the result
 /// is the invariant's. Values beyond the range of single precision become the nearest finite float. Metadata are copied
 /// from the field, and `tensorray:units`, if present, becomes the unit of the invariant. Runs on all threads.
+/// Of a grid of several levels, that of level 0.
 ScalarGrid invariant_grid(Invariant which, const TensorGrid& grid);
 
 }  // namespace tensorray

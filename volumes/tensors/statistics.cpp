@@ -90,15 +90,19 @@ void join(const std::vector<BlockStatistics>& blocks, FieldStatistics& result) {
 }
 
 void describe_extent(const TensorGrid& grid, FieldStatistics& result) {
-  const TensorField field(grid);
+  const TensorField field(grid, {grid.finer.empty() ? Interpolation::linear : Interpolation::cubic});
   result.index_box = grid.active_box();
   result.world_box = field.world_box();
   result.memory_bytes = field.memory_bytes();
 }
 
 bool all_finite(const TensorGrid& grid) {
-  return std::all_of(grid.blocks.begin(), grid.blocks.end(), [](const TensorBlock& block) {
+  const auto is_finite = [](const TensorBlock& block) {
     return std::all_of(block.values.begin(), block.values.end(), [](const auto& value) { return value.allFinite(); });
+  };
+  const std::vector<const TensorBlocks*> levels = levels_of(grid);
+  return std::all_of(levels.begin(), levels.end(), [&](const TensorBlocks* blocks) {
+    return std::all_of(blocks->begin(), blocks->end(), is_finite);
   });
 }
 
@@ -107,9 +111,14 @@ void describe_finite(const TensorGrid& grid, FieldStatistics& result) {
   if (grid.active_voxels() == 0) return;
   describe_extent(grid, result);
   result.asymmetry = asymmetry(grid);
-  std::vector<BlockStatistics> blocks(grid.blocks.size());
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) { blocks[i] = statistics_of(grid.blocks[i]); });
-  join(blocks, result);
+  std::vector<BlockStatistics> all;
+  for (const TensorBlocks* blocks : levels_of(grid)) {
+    const std::size_t first = all.size();
+    all.resize(first + blocks->size());
+    tbb::parallel_for(std::size_t{0}, blocks->size(),
+                      [&](std::size_t i) { all[first + i] = statistics_of((*blocks)[i]); });
+  }
+  join(all, result);
 }
 
 }  // namespace
@@ -121,7 +130,10 @@ double FieldStatistics::stable_step(double flexibility) const {
 
 FieldStatistics field_statistics(const TensorGrid& grid) {
   FieldStatistics result;
-  result.active_voxels = grid.active_voxels();
+  for (const TensorBlocks* blocks : levels_of(grid)) {
+    result.voxels_of_levels.push_back(active_voxels(shapes_of(*blocks)));
+    result.active_voxels += result.voxels_of_levels.back();
+  }
   result.voxel_size = grid.to_world.linear().colwise().norm();
   if (all_finite(grid)) {
     describe_finite(grid, result);

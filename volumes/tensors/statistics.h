@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -12,12 +13,13 @@
 namespace tensorray {
 
 struct FieldStatistics {
-  std::size_t active_voxels = 0;
-  std::size_t non_finite = 0;           ///< Voxels that are not finite; all numbers below leave them out.
-  Eigen::AlignedBox3i index_box;        ///< Box of the active voxels.
-  Eigen::Vector3d voxel_size{0, 0, 0};  ///< Edge lengths, world units.
-  Eigen::AlignedBox3d world_box;        ///< Box of the corners of the extent, world space.
-  std::size_t memory_bytes = 0;         ///< Size of the TensorField in memory.
+  std::size_t active_voxels = 0;              ///< Of all levels.
+  std::vector<std::size_t> voxels_of_levels;  ///< Of each of them.
+  std::size_t non_finite = 0;                 ///< Voxels that are not finite; all numbers below leave them out.
+  Eigen::AlignedBox3i index_box;              ///< Box of the active voxels of level 0.
+  Eigen::Vector3d voxel_size{0, 0, 0};        ///< Edge lengths, world units; of level 0.
+  Eigen::AlignedBox3d world_box;              ///< Box of the corners of the extent, world space.
+  std::size_t memory_bytes = 0;               ///< Size of the TensorField in memory.
 
   static constexpr std::array<double, 7> percentiles{0, 1, 25, 50, 75, 99, 100};
   std::array<double, 7> norm{};       ///< Frobenius norm at those percentiles (nearest rank).

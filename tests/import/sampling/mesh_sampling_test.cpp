@@ -113,7 +113,9 @@ TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {
   const auto mesh = curvilinear(
       {202, 2, 2}, [](const Vector3d& p) { return Vector3d(p.x() < 0.999 ? p.x() * 1e-4 : 1.0, p.y(), p.z()); });
   add_linear_tensor(*mesh);
-  const double voxels = sampling_lattice(*mesh, solid_part(*mesh), {}).size.cast<double>().prod();
+  SamplingSettings settings;
+  settings.levels = 1;
+  const double voxels = sampling_lattice(*mesh, solid_part(*mesh), settings).size.cast<double>().prod();
   EXPECT_LE(voxels, 1 << 21);
   EXPECT_GE(voxels, 0.9 * (1 << 21));
 }
@@ -144,7 +146,9 @@ TEST(MeshSampling, ReportsThePeakThatCoarseVoxelsMiss) {
     return flat(Matrix3d::Identity() * std::max(0.0, 1 - 8 * std::abs(p.x() - 0.0625)));
   });
   SamplingReport report;
-  sampled(*mesh, resolution(9), report);
+  SamplingSettings coarse = resolution(9);
+  coarse.levels = 1;
+  sampled(*mesh, coarse, report);
   EXPECT_NEAR(report.native_peak, std::sqrt(3.0), 1e-12);
   EXPECT_NEAR(report.sampled_peak, std::sqrt(3.0) / 2, 1e-6);
   EXPECT_EQ(report.sampled_median, 0);

@@ -84,6 +84,60 @@ TEST(OverlappingBlocks, TheFinerCellCountsInAnyOrder) {
     }
 }
 
+/// Blocks as adaptive codes write them: each halves the cells of the one before within a part of it.
+std::string amr(const std::string& form, int levels) {
+  const std::string folder = "levels/";
+  std::string text, name = form == ".vth" ? "vtkOverlappingAMR" : "vtkMultiBlockDataSet";
+  for (int level = 0; level < levels; ++level) {
+    const std::string set =
+        "<DataSet index=\"0\" amr_box=\"0 7 0 7 0 7\" file=\"" + folder + std::to_string(level) + ".vti\"/>";
+    text +=
+        "<Block level=\"" + std::to_string(level) + "\" index=\"" + std::to_string(level) + "\">" + set + "</Block>\n";
+  }
+  return "<VTKFile type=\"" + name + "\" version=\"1.1\"><" + name + ">" + text + "</" + name + "></VTKFile>\n";
+}
+
+TEST(OverlappingBlocks, LevelsOfAdaptiveRefinementArriveAsLevels) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "levels");
+  const double begins[] = {0, 8, 12}, edges[] = {1, 0.5, 0.25};
+  for (int level = 0; level < 3; ++level) {
+    const Set block = cube(".vti", begins[level], edges[level], level == 0 ? 32 : 16);
+    add_values(*block, true, level + 1);
+    write_xml(*block, folder / "levels" / (std::to_string(level) + ".vti"));
+  }
+  for (const std::string form : {".vth", ".vtm"})
+    for (const int levels : {2, 3}) {
+      SCOPED_TRACE(form + std::to_string(levels));
+      write_bytes(folder / ("all" + form), amr(form, levels));
+      ImportReport report;
+      ImportSettings settings;
+      settings.files = {folder / ("all" + form)};
+      const TensorGrid grid = import_tensors(settings, Progress(), report);
+      EXPECT_NEAR(report.mesh->voxel.x(), 1, 1e-9);
+      ASSERT_EQ(grid.finer.size(), static_cast<std::size_t>(levels - 1));
+      for (int level = 1; level < levels; ++level) {
+        TensorGrid one;
+        one.blocks = grid.finer[static_cast<std::size_t>(level - 1)];
+        one.to_world = grid.to_world * Eigen::Scaling(std::pow(0.5, level));
+        const Eigen::AlignedBox3d block(Vector3d::Constant(begins[level]),
+                                        Vector3d::Constant(begins[level] + 16 * edges[level]));
+        std::size_t inside = 0;
+        mesh_fixtures::for_each_voxel(one, [&](const Vector3d& x, const Matrix3d& tensor) {
+          const bool is_last =
+              level + 1 == levels ||
+              !Eigen::AlignedBox3d(Vector3d::Constant(begins[level + 1] - 0.6 * edges[level]),
+                                   Vector3d::Constant(begins[level + 1] + 16 * edges[level + 1] + 0.6 * edges[level]))
+                   .contains(x);
+          if (!block.contains(x) || !is_last) return;
+          ++inside;
+          EXPECT_LT((tensor - (level + 1) * Matrix3d::Identity()).norm(), 1e-5) << x.transpose();
+        });
+        EXPECT_GT(inside, 2000u);
+      }
+    }
+}
+
 TEST(OverlappingBlocks, PiecesWithACommonFaceAreJoined) {
   const TemporaryFolder folder;
   write_xml(*bar(0, 3), folder / "a.vtu");

@@ -60,6 +60,14 @@ TEST_F(ImportErrors, WrongArguments) {
   refuses({"image.vti", "--voxel-size", "1", "2", "3"}, 2, {"image.vti", "--voxel-size", "one"});
   refuses({"image.vti", "--voxel-size", "1e-6"}, 2, {"--voxel-size", "limit"});
   refuses({"image.vti", "--resolution", "8", "8"}, 2, {"--resolution"});
+  for (const char* const levels : {"0", "5", "many"})
+    refuses({"image.vti", "--resolution", "8", "--levels", levels}, 2, {"--levels"});
+  for (const char* const error : {"200%", "1.5", "x", "%"})
+    refuses({"image.vti", "--resolution", "8", "--error", error}, 2, {"--error", "1%"});
+  refuses({"image.vti", "--voxel-size", "1", "--finest", "2"}, 2, {"--finest", "--voxel-size"});
+  refuses({"image.vti", "--resolution", "8", "--finest", "0.1"}, 2, {"--finest", "--resolution"});
+  for (const char* const file : {"image.vti", "array.npy"})
+    refuses({file, "--levels", "2"}, 2, {file, "--levels", "one size"});
   refuses({"image.vti", "--bounds", "1", "0", "0", "1", "0", "1"}, 2, {"--bounds"});
   refuses({"image.vti", "--boundary", "body.stl"}, 2, {"--boundary", ".ply"});
   refuses({"image.vti", "-o", "image.txt"}, 2, {"--output"});

@@ -37,24 +37,6 @@ Matrix3d cubic_polynomial(const Vector3d& p) {
   return T;
 }
 
-/// A ray through a formula, by the classical Runge–Kutta method with steps far below what tests measure.
-Ray through_formula(const std::function<Matrix3d(const Vector3d&)>& T, double s, Vector3d P, Vector3d V,
-                    double length) {
-  constexpr int steps = 4000;
-  const double h = length / steps;
-  const auto bend = [&](const Vector3d& at, const Vector3d& v) {
-    const Vector3d Tv = T(at) * v;
-    return Vector3d(s * (Tv - v.dot(Tv) / v.squaredNorm() * v));
-  };
-  for (int i = 0; i < steps; ++i) {
-    const Vector3d k1 = bend(P, V), v2 = V + h / 2 * k1, k2 = bend(P + h / 2 * V, v2), v3 = V + h / 2 * k2,
-                   k3 = bend(P + h / 2 * v2, v3), v4 = V + h * k3, k4 = bend(P + h * v3, v4);
-    P += h / 6 * (V + 2 * v2 + 2 * v3 + v4);
-    V = (V + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)).normalized();
-  }
-  return {P, V};
-}
-
 struct Start {
   Vector3d position, direction;
 };

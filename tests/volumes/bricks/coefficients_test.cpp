@@ -50,7 +50,7 @@ MadeBricks make(const BlockTable& table, const Interpolant& interpolant, bool sy
   const Eigen::AlignedBox3i extent = active_box(table.shapes);
   CoefficientBricks bricks = coefficient_bricks(table, extent, interpolant);
   bricks.slabs = slabs_of(bricks.places, most);
-  MadeBricks made{brick_memory(bricks, interpolant.between, components), {}};
+  MadeBricks made{brick_memory({bricks}, interpolant.between, components), {}};
   const BrickMemory blocks = blocks_within(made.bricks, bricks);
   std::mt19937 random(7);
   std::uniform_real_distribution<float> uniform(-1, 1);

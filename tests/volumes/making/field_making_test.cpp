@@ -7,6 +7,7 @@
 #include <tbb/global_control.h>
 
 #include "tests/volumes/grid_support.h"
+#include "tests/volumes/level_support.h"
 #include "volumes/bricks/brick_layout.h"
 
 namespace tensorray {
@@ -82,6 +83,26 @@ TEST(FieldMaking, NothingIsLeftOfAFieldThatIsNotFinite) {
   EXPECT_FALSE(made.field);
   EXPECT_EQ(made.voxels, 0u);
   EXPECT_EQ(made.non_finite, static_cast<std::size_t>((box.sizes() + Vector3i::Ones()).prod()));
+}
+
+/// Cleaned and preprocessed at the voxels of each level, bit for bit as a grid that was changed before.
+TEST(MakeField, LevelsAreEachCleanedAndPreprocessed) {
+  const auto value = [](const Eigen::Vector3d& at) { return symmetric((2 * at).cast<int>()); };
+  TensorGrid grid = grid_of_levels(
+      {Vector3i(0, 0, 0), Vector3i(24, 9, 10)}, 2, [](const Vector3i& brick) { return brick.x() < 2; }, value);
+  grid.finer[0][3].values[grid.finer[0][3].active._Find_first()](0, 0) = std::numeric_limits<float>::infinity();
+  TensorGrid changed = grid;
+  EXPECT_EQ(remove_non_finite(changed), 1u);
+  for (TensorBlocks* blocks : levels_of(changed))
+    for (TensorBlock& block : *blocks) apply_eigenvalues(block, Eigenvalues::absolute);
+  const MadeField made = make_field(view_of(grid), Eigenvalues::automatic, {Interpolation::cubic});
+  const TensorField expected(changed, {Interpolation::cubic});
+  EXPECT_EQ(made.non_finite, 1u);
+  EXPECT_EQ(made.finer_voxels, std::vector<std::size_t>{active_voxels(shapes_of(changed.finer[0]))});
+  const BrickMemory &one = made.field->memory(), &other = expected.memory();
+  ASSERT_EQ(one.bytes(), other.bytes());
+  EXPECT_TRUE(std::equal(one.floats.get(), one.floats.get() + one.count * one.stride, other.floats.get()));
+  EXPECT_EQ(made.field->max_norm(), expected.max_norm());
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 
 #include "base/constants.h"
 #include "tests/volumes/grid_support.h"
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/sampling/tensor_sampler.h"
 #include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
@@ -214,6 +216,32 @@ TEST(Generators, ASliceHasOneVoxel) {
   EXPECT_NEAR(slice.to_world.linear()(1, 1), 0.25, 1e-15);  // Equal to the smaller spacing of the other axes.
   grid.max.y() = 0.75;
   EXPECT_NEAR((generate(Constant{}, grid).to_world * Vector3d::Zero()).y(), 0.5, 1e-15);
+}
+
+/// Nearer to the load, the field of finer levels is nearer to the formula.
+TEST(Generators, LevelsRefineTowardsTheLoad) {
+  const PointLoad load;
+  GridSettings settings = default_grid(load, 33);
+  const Vector3d origin(0, 0, 0);
+  double errors[3];
+  for (const int levels : {1, 2, 3}) {
+    settings.levels = levels;
+    const TensorField field(generate(load, settings), {Interpolation::cubic});
+    EXPECT_EQ(field.levels(), levels);
+    TensorSampler sampler(field);
+    double& error = errors[levels - 1] = 0;
+    for (int i = 0; i < 50; ++i) {
+      const Vector3d at(0.1 * std::cos(i), 0.1 * std::sin(i), -0.08 - 0.002 * i);
+      const Matrix3d exact = point_load_stress(at - origin, load.load, load.poisson_ratio);
+      error = std::max(error, (sampler.at(at) - exact).norm() / exact.norm());
+    }
+  }
+  EXPECT_LT(errors[1], errors[0] / 4);
+  EXPECT_LT(errors[2], errors[1] / 4);
+  settings.levels = 2;
+  EXPECT_THROW(generate(Constant{}, settings), std::invalid_argument);
+  settings.levels = 5;
+  EXPECT_THROW(generate(load, settings), std::invalid_argument);
 }
 
 }  // namespace

@@ -75,6 +75,13 @@ TEST(Smoothing, IsTheMeanOfActiveVoxels) {
   }
 }
 
+TEST(Smoothing, LevelsAreRefused) {
+  TensorGrid grid = grid_of(smoothed_box, waves);
+  grid.finer.push_back(grid.blocks);
+  EXPECT_NO_THROW(smooth(grid, 0));
+  EXPECT_THROW(smooth(grid, 1), std::invalid_argument);
+}
+
 TEST(Smoothing, DoesNotDependOnThreads) {
   TensorGrid many = grid_of(smoothed_box, waves), one = many;
   smooth(many, 2);

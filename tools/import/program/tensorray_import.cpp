@@ -32,6 +32,8 @@
 #include "tools/import/import_file.h"
 #include "tools/import/program/child_process.h"
 #include "tools/import/vtk_formats/vtp_files.h"
+#include "volumes/bricks/brick_layout.h"
+#include "volumes/bricks/tensor_field.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/grids/page_memory.h"
 
@@ -45,10 +47,11 @@ constexpr double max_negative = 0.2;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, order, frame, cells = "linear";
+  std::string array, gradient_of, strain_of, order, frame, cells = "linear", error;
   std::vector<int> resolution;
   std::vector<double> voxel_size, bounds, origin;
-  double thickness = 0;
+  double thickness = 0, finest = 0;
+  int levels = 0;
   std::filesystem::path output, boundary;
   std::string name, units, steps = "last";
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
@@ -63,6 +66,16 @@ std::optional<Value> named(const std::string& name, const std::vector<std::pair<
   return {};
 }
 
+/// A part as 1% or 0.01. @throw std::invalid_argument
+double part_of(const std::string& text) {
+  double value = 0;
+  const bool is_percent = !text.empty() && text.back() == '%';
+  if (!CLI::detail::lexical_cast(is_percent ? text.substr(0, text.size() - 1) : text, value) || !(value >= 0) ||
+      !(value *= is_percent ? 0.01 : 1.0, value <= 1))
+    throw std::invalid_argument("--error " + escaped(text) + ": give a part of the peak, as 1% or 0.01");
+  return value;
+}
+
 ImportSettings settings_of(const ImportOptions& options) {
   ImportSettings settings = options.settings;
   settings.array = options.array + options.gradient_of + options.strain_of;  // They exclude each other.
@@ -75,6 +88,11 @@ ImportSettings settings_of(const ImportOptions& options) {
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
   if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
+  if (options.levels > 0) settings.sampling.levels = options.levels;
+  if (options.finest > 0) settings.sampling.finest = options.finest;
+  if (!options.error.empty()) settings.sampling.error = part_of(options.error);
+  if (options.finest > 0 && options.voxel_size.size() == 1 && options.finest > options.voxel_size[0])
+    throw std::invalid_argument("--finest must not be larger than --voxel-size, which is the coarsest");
   if (options.thickness > 0) settings.thickness = options.thickness;
   if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
   if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
@@ -123,14 +141,31 @@ void print_sampling(const ImportReport& report) {
          false);
 }
 
-void print_surface(const BodySurface& surface, const TriangleMesh& triangles) {
+/// Of a field of several levels. @param blocks  Of all levels.
+void print_levels(const SamplingReport& mesh, std::size_t blocks, bool is_symmetric) {
+  for (std::size_t i = 0; i < mesh.finer.size(); ++i)
+    tell_made(fmt::format("  level {}: voxels of {:.4g} in {} refined bricks of level {}; {} active", i + 1,
+                          mesh.finer[i].voxel, mesh.finer[i].bricks, i, mesh.finer[i].active));
+  const double floats = CubicBrick::stored_floats(is_symmetric ? TensorBrick::symmetric : TensorBrick::general);
+  if (!mesh.finer.empty())
+    tell_made(
+        fmt::format("  refined where voxels differ from the mesh by more than {:.3g}% of its peak (--error); {} "
+                    "in memory",
+                    100 * mesh.wanted_error, bytes_text(static_cast<double>(blocks) * floats * sizeof(float))));
+  if (mesh.is_too_large)
+    tell_made("  the next level is left out, as it would have too many voxels; --voxel-size or --finest lets it be");
+}
+
+void print_surface(const BodySurface& surface, const TriangleMesh& triangles, double voxels) {
   const std::string inner =
       surface.inner_faces > 0 ? fmt::format("; {} inner faces left out", surface.inner_faces) : "";
   if (surface.open_edges > 0)
     tell_made(fmt::format("  surface: none, as the cells' faces leave {} edges open{}", surface.open_edges, inner));
   else
-    tell_made(fmt::format("  surface: {} triangles, volume {:.6g}{}{}", triangles.triangles.size(), triangles.volume(),
-                          surface.area > 0 ? fmt::format(", area {:.6g}", surface.area) : "", inner));
+    tell_made(fmt::format("  surface: {} triangles, volume {:.6g}{}, filled by voxels to {:.1f}%{}",
+                          triangles.triangles.size(), triangles.volume(),
+                          surface.area > 0 ? fmt::format(", area {:.6g}", surface.area) : "",
+                          100 * voxels / triangles.volume(), inner));
 }
 
 /// Progress as a line of phase, done and total, for a program that has started this one.
@@ -151,6 +186,9 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
   if (!options.units.empty()) grid.metadata["tensorray:units"] = options.units;
   progress.update("writing", 0, 1);
   const std::string name = grid.name;
+  const bool is_symmetric = asymmetry(grid) < symmetric_tolerance;
+  std::size_t blocks = 0;
+  for (const TensorBlocks* level : levels_of(grid)) blocks += level->size();
   const Eigen::Vector3i size = grid.active_box().sizes() + Eigen::Vector3i::Ones();
   output.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, grid, options.half); });
   bar.reset();
@@ -162,7 +200,8 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
     tell_made(fmt::format("  a flat mesh: a slab of one voxel, {:.4g} thick{}", report.thickness,
                           settings.thickness ? "" : " (--thickness)"));
   if (report.mesh) print_sampling(report);
-  if (report.surface) print_surface(*report.surface, grid.surface);
+  if (report.mesh) print_levels(*report.mesh, blocks, is_symmetric);
+  if (report.surface) print_surface(*report.surface, grid.surface, report.mesh->volume);
   for (const std::string& note : report.notes) tell_made(fmt::format("  {}", escaped(note)));
   for (const std::string& warning : report.warnings) tell({"tensorray: warning: " + warning}, false);
   if (report.boundary_triangles > 0)
@@ -318,6 +357,22 @@ void add_where(CLI::App& command, ImportOptions& options) {
       .add_option("--thickness", options.thickness,
                   "Thickness of the slab that a flat mesh becomes (default: a typical edge of its cells)")
       ->check(positive);
+  command
+      .add_option("--levels", options.levels,
+                  "At most so many sizes of voxels, of which each is half of the one before, as fine as the cells of "
+                  "the mesh ask (default: 4)")
+      ->check(CLI::Range(1, max_levels));
+  command
+      .add_option("--finest", options.finest,
+                  "The least edge of a voxel (default: what the levels reach); without --voxel-size, which is the "
+                  "coarsest, the levels are counted from it")
+      ->check(positive)
+      ->excludes(resolution);
+  command
+      .add_option("--error", options.error,
+                  "Refine where voxels differ from the mesh by more than this part of its peak, as 1%; 0: wherever "
+                  "cells are smaller than voxels")
+      ->option_text("PART");
   command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6);
 }
 
@@ -331,7 +386,7 @@ void add_import_options(CLI::App& program, Progress& progress) {
   program.option_defaults()->group(usual_group);
   program
       .add_option("FILE", options->settings.files,
-                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .pvd .vtkhdf), XDMF (.xdmf .xmf), "
+                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .vth .pvd .vtkhdf), XDMF (.xdmf .xmf), "
                   "EnSight (.case), ExodusII (.ex2 .exo .e .g), CGNS "
                   "(.cgns), an OpenFOAM "
                   "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), MetaImage (.mha "

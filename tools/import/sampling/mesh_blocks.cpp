@@ -3,6 +3,7 @@
 #include <atomic>
 #include <bitset>
 #include <cmath>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include <vtkDataSet.h>
 
 #include "tools/import/meshes/mesh_cell.h"
+#include "tools/import/sampling/block_places.h"
 #include "tools/import/sampling/cell_parts.h"
 #include "tools/import/sampling/sampling_lattice.h"
 #include "tools/import/sampling/voxel_average.h"
@@ -23,24 +25,12 @@ using Eigen::AlignedBox3i;
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 using Tensor = VoxelAverage::Tensor;
-using Voxels = std::bitset<TensorBlock::voxels>;
 
-/// For each block of the lattice, the cells that may have voxels in it, by ascending index: the cells of block b are
+/// For each block that is sampled, the cells that may have voxels in it, by ascending index: the cells of block b are
 /// cells[first[b]] to cells[first[b + 1] − 1].
 struct Bins {
-  Vector3i blocks = Vector3i::Zero();
   std::vector<std::size_t> first;
   std::vector<vtkIdType> cells;
-
-  std::size_t index(int x, int y, int z) const {
-    return (static_cast<std::size_t>(x) * static_cast<std::size_t>(blocks.y()) + static_cast<std::size_t>(y)) *
-               static_cast<std::size_t>(blocks.z()) +
-           static_cast<std::size_t>(z);
-  }
-  Vector3i block(std::size_t index) const {
-    const auto ny = static_cast<std::size_t>(blocks.y()), nz = static_cast<std::size_t>(blocks.z());
-    return {static_cast<int>(index / nz / ny), static_cast<int>(index / nz % ny), static_cast<int>(index % nz)};
-  }
 };
 
 /// Indices of the voxels whose centres may be in a box, or no farther than `margin` from it; empty if there are none.
@@ -56,29 +46,41 @@ AlignedBox3i voxels_in(const AlignedBox3d& box, const SamplingLattice& lattice, 
   return {from.cast<int>().matrix(), to.cast<int>().matrix()};
 }
 
-/// Calls `visit(block)` with the index of each block that has voxels among `voxels`.
+/// Calls `visit(block)` with the number of each block that has voxels among `voxels`.
 template <class Visit>
-void for_each_block(const Bins& bins, const AlignedBox3i& voxels, const Visit& visit) {
+void for_each_block(const BlockPlaces& places, const AlignedBox3i& voxels, const Visit& visit) {
   if (voxels.isEmpty()) return;
   const Vector3i from = voxels.min() / TensorBlock::size, to = voxels.max() / TensorBlock::size;
   for (int x = from.x(); x <= to.x(); ++x)
     for (int y = from.y(); y <= to.y(); ++y)
-      for (int z = from.z(); z <= to.z(); ++z) visit(bins.index(x, y, z));
+      for (int z = from.z(); z <= to.z(); ++z)
+        if (const std::optional<std::size_t> block = places.number(x, y, z)) visit(*block);
 }
 
-Bins bins_of(const Solid& solid, const SamplingLattice& lattice, const Vector3d& margin) {
+Bins bins_of(const Solid& solid, const SamplingLattice& lattice, const BlockPlaces& places, const Vector3d& margin) {
   Bins bins;
-  bins.blocks = (lattice.size.array() + (TensorBlock::size - 1)) / TensorBlock::size;
-  bins.first.assign(bins.index(bins.blocks.x(), 0, 0) + 1, 0);
+  bins.first.assign(places.count() + 1, 0);
   for (const AlignedBox3d& box : solid.boxes)
-    for_each_block(bins, voxels_in(box, lattice, margin), [&](std::size_t block) { ++bins.first[block + 1]; });
+    for_each_block(places, voxels_in(box, lattice, margin), [&](std::size_t block) { ++bins.first[block + 1]; });
   for (std::size_t block = 1; block < bins.first.size(); ++block) bins.first[block] += bins.first[block - 1];
   bins.cells.resize(bins.first.back());
   std::vector<std::size_t> next(bins.first.begin(), bins.first.end() - 1);
   for (std::size_t id = 0; id < solid.boxes.size(); ++id)
-    for_each_block(bins, voxels_in(solid.boxes[id], lattice, margin),
+    for_each_block(places, voxels_in(solid.boxes[id], lattice, margin),
                    [&](std::size_t block) { bins.cells[next[block]++] = static_cast<vtkIdType>(id); });
   return bins;
+}
+
+/// The numbers of the blocks with cells and voxels that are wanted, ordered by origin.
+std::vector<std::size_t> used_blocks(const Bins& bins, const BlockPlaces& places, const std::vector<VoxelSet>& wanted) {
+  std::vector<std::size_t> used;
+  for (std::size_t block = 0; block + 1 < bins.first.size(); ++block)
+    if (bins.first[block] < bins.first[block + 1] && (wanted.empty() || wanted[block].any())) used.push_back(block);
+  std::sort(used.begin(), used.end(), [&](std::size_t a, std::size_t b) {
+    const Vector3i of_a = places.place(a), of_b = places.place(b);
+    return std::lexicographical_compare(of_a.begin(), of_a.end(), of_b.begin(), of_b.end());
+  });
+  return used;
 }
 
 /// The tensor of `cell`, whose weights are those at a position; not finite if a point with a weight has no finite
@@ -113,9 +115,9 @@ struct Workspace {
   std::array<int, TensorBlock::voxels> layer{};        ///< From which each voxel has its value.
 };
 
-/// The voxels of a block whose centres are in a cell, and those that are in cells of several layers.
+/// The voxels of a block that stay inactive, whose centres are in a cell, and that are in cells of several layers.
 struct Filled {
-  Voxels taken, overlaid;
+  VoxelSet unwanted, taken, overlaid;
 };
 
 /// Sets the tensor of a voxel whose centre is in the loaded cell. Where layers overlap, cells without data do not
@@ -142,12 +144,15 @@ void fill_from_cell(const MeshSource& source, Workspace& work, vtkIdType id, Ten
   if (voxels.isEmpty()) return;
   const Vector3i from = (voxels.min() - block.origin).cwiseMax(0);
   const Vector3i to = (voxels.max() - block.origin).cwiseMin(TensorBlock::size - 1);
+  bool is_loaded = false;
   for (int x = from.x(); x <= to.x(); ++x)
     for (int y = from.y(); y <= to.y(); ++y)
       for (int z = from.z(); z <= to.z(); ++z) {
         const auto offset = static_cast<std::size_t>(TensorBlock::offset(x, y, z));
         const bool is_done = !source.layers || filled.overlaid[offset] || work.layer[offset] == source.layers[id];
-        if (filled.taken[offset] && is_done) continue;
+        if (filled.unwanted[offset] || (filled.taken[offset] && is_done)) continue;
+        if (!is_loaded && !load(source, work.cell, id)) return;
+        is_loaded = true;
         if (work.cell.find(source.lattice.position(block.origin + Vector3i(x, y, z)), source.tolerance))
           fill_voxel(source, work, id, offset, block, filled);
       }
@@ -155,10 +160,10 @@ void fill_from_cell(const MeshSource& source, Workspace& work, vtkIdType id, Ten
 
 /// @return the number of voxels in several layers.
 std::size_t fill_centres(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
-                         TensorBlock& block) {
-  Filled filled;
-  for (const vtkIdType* id = begin; id != end && (source.layers || !filled.taken.all()); ++id)
-    if (load(source, work.cell, *id)) fill_from_cell(source, work, *id, block, filled);
+                         const VoxelSet& unwanted, TensorBlock& block) {
+  Filled filled{unwanted, {}, {}};
+  for (const vtkIdType* id = begin; id != end && (source.layers || !(filled.taken | unwanted).all()); ++id)
+    fill_from_cell(source, work, *id, block, filled);
   return filled.overlaid.count();
 }
 
@@ -181,9 +186,13 @@ bool may_be_fine(const MeshSource& source, vtkIdType id) {
   return source.solid.thickness[static_cast<std::size_t>(id)] < source.lattice.voxel.maxCoeff();
 }
 
-/// The box of voxels of the lattice, with all their volume.
-AlignedBox3d box_of(const SamplingLattice& lattice, const AlignedBox3i& voxels) {
-  return {lattice.position(voxels.min()) - 0.5 * lattice.voxel, lattice.position(voxels.max()) + 0.5 * lattice.voxel};
+/// The box of voxels of the block, with all their volume.
+AlignedBox3d box_of(const MeshSource& source, const TensorBlock& block, const VoxelSet& voxels) {
+  AlignedBox3i box;
+  for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+    if (voxels[static_cast<std::size_t>(offset)]) box.extend(Vector3i(block.origin + TensorBlock::position(offset)));
+  const SamplingLattice& lattice = source.lattice;
+  return {lattice.position(box.min()) - 0.5 * lattice.voxel, lattice.position(box.max()) + 0.5 * lattice.voxel};
 }
 
 /// The change of the tensor along the edges of a part of `cell`.
@@ -212,7 +221,7 @@ Eigen::Array3d sample_counts(const Vector3d& centre, const Eigen::Matrix3d& edge
 
 /// Adds samples of a part, evenly spaced along its edges, to the averages of the voxels of the block that they are in.
 void add_samples(const MeshSource& source, Workspace& work, const AveragedCell& cell, const TensorBlock& block,
-                 const Voxels& voxels, const CellPart& part) {
+                 const VoxelSet& voxels, const CellPart& part) {
   const SamplingLattice& lattice = source.lattice;
   const Tensor tensor = tensor_in(source, work.cell, cell.id, part.weights);
   const Eigen::Matrix<double, 9, 3> changes = changes_in(source, work.cell, part);
@@ -238,33 +247,30 @@ void add_samples(const MeshSource& source, Workspace& work, const AveragedCell& 
 
 /// Adds the part of the cell that is in `voxels` of the block to their averages.
 void add_parts(const MeshSource& source, Workspace& work, const AveragedCell& cell, const TensorBlock& block,
-               const Voxels& voxels, const AlignedBox3d& where) {
+               const VoxelSet& voxels, const AlignedBox3d& where) {
   visit_parts(work.cell, source.lattice.voxel, where,
               [&](const CellPart& part) { add_samples(source, work, cell, block, voxels, part); });
 }
 
 /// Adds the cells that are thinner than voxels. @return the voxels that have some.
-Voxels add_fine_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
-                      const TensorBlock& block) {
-  const AlignedBox3i all(block.origin, block.origin + Vector3i::Constant(TensorBlock::size - 1));
-  const AlignedBox3d where = box_of(source.lattice, all);
+VoxelSet add_fine_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
+                        const TensorBlock& block) {
+  const AlignedBox3d where = box_of(source, block, block.active);
   for (const vtkIdType* id = begin; id != end; ++id) {
-    if (!may_be_fine(source, *id) || !load(source, work.cell, *id)) continue;
+    if (!may_be_fine(source, *id) || !source.solid.boxes[static_cast<std::size_t>(*id)].intersects(where)) continue;
+    if (!load(source, work.cell, *id)) continue;
     const AveragedCell cell = averaged_cell(work.cell, *id, source.lattice.voxel);
     if (cell.fineness > 0) add_parts(source, work, cell, block, block.active, where);
   }
-  Voxels voxels;
+  VoxelSet voxels;
   for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) voxels[offset] = !work.averages[offset].empty();
   return voxels;
 }
 
 /// Adds the other cells, in voxels that have some thin ones.
 void add_coarse_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
-                      const TensorBlock& block, const Voxels& voxels) {
-  AlignedBox3i some;
-  for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-    if (voxels[static_cast<std::size_t>(offset)]) some.extend(Vector3i(block.origin + TensorBlock::position(offset)));
-  const AlignedBox3d where = box_of(source.lattice, some);
+                      const TensorBlock& block, const VoxelSet& voxels) {
+  const AlignedBox3d where = box_of(source, block, voxels);
   for (const vtkIdType* id = begin; id != end; ++id) {
     const AlignedBox3d& box = source.solid.boxes[static_cast<std::size_t>(*id)];
     if (!box.intersects(where) || !load(source, work.cell, *id)) continue;
@@ -277,7 +283,7 @@ void add_coarse_cells(const MeshSource& source, const vtkIdType* begin, const vt
 void average_voxels(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
                     TensorBlock& block) {
   if (std::none_of(begin, end, [&](vtkIdType id) { return may_be_fine(source, id); })) return;
-  const Voxels voxels = add_fine_cells(source, begin, end, work, block);
+  const VoxelSet voxels = add_fine_cells(source, begin, end, work, block);
   if (voxels.none()) return;
   add_coarse_cells(source, begin, end, work, block, voxels);
   for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) {
@@ -298,11 +304,10 @@ Vector3d margin_of(const MeshSource& source) {
 
 }  // namespace
 
-TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress, std::size_t& overlaid) {
-  Bins bins = bins_of(source.solid, source.lattice, margin_of(source));
-  std::vector<std::size_t> used;
-  for (std::size_t block = 0; block + 1 < bins.first.size(); ++block)
-    if (bins.first[block] < bins.first[block + 1]) used.push_back(block);
+TensorBlocks mesh_blocks(const MeshSource& source, const BlockPlaces& places, const std::vector<VoxelSet>& wanted,
+                         const Progress& progress, std::size_t& overlaid) {
+  Bins bins = bins_of(source.solid, source.lattice, places, margin_of(source));
+  const std::vector<std::size_t> used = used_blocks(bins, places, wanted);
   TensorBlocks blocks = make_blocks(used.size());
   const std::thread::id caller = std::this_thread::get_id();
   std::atomic<std::uint64_t> done{0};
@@ -319,8 +324,8 @@ TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress, std
       vtkIdType* const begin = bins.cells.data() + bins.first[used[i]];
       vtkIdType* const end = bins.cells.data() + bins.first[used[i] + 1];
       if (source.layers) std::sort(begin, end, is_finer);
-      blocks[i].origin = TensorBlock::size * bins.block(used[i]);
-      in_layers += fill_centres(source, begin, end, work, blocks[i]);
+      blocks[i].origin = TensorBlock::size * places.place(used[i]);
+      in_layers += fill_centres(source, begin, end, work, wanted.empty() ? VoxelSet() : ~wanted[used[i]], blocks[i]);
       if (blocks[i].active.any()) average_voxels(source, begin, end, work, blocks[i]);
     }
     done += range.size();

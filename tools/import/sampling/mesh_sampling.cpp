@@ -14,6 +14,8 @@
 #include <vtkPointData.h>
 
 #include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/sampling/block_places.h"
+#include "tools/import/sampling/refinement.h"
 #include "tools/import/sampling/sampling_lattice.h"
 #include "volumes/grids/page_memory.h"
 
@@ -24,6 +26,8 @@ using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
 
 constexpr double face_tolerance = 1e-6;  ///< As a fraction of the mesh's diagonal.
+
+constexpr double default_error = 0.01;
 
 /// There may be as many as voxels.
 using Norms = std::vector<double, PageAllocator<double>>;
@@ -75,14 +79,81 @@ void report_native(const MeshSource& source, const AlignedBox3d& bounds, Samplin
   std::tie(report.native_peak, report.native_median) = peak_and_median(norms);
 }
 
+/// Voxels at the ends of the lattice count by half along an axis, as they are on the faces of what is sampled.
+double volume_of(const TensorBlocks& blocks, const SamplingReport& report) {
+  double voxels = 0;
+  for (const TensorBlock& block : blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[static_cast<std::size_t>(offset)]) continue;
+      const Eigen::Array3i index = block.origin + TensorBlock::position(offset), last = report.size.array() - 1;
+      voxels += std::pow(0.5, ((index == 0 || index == last) && last > 0).count());
+    }
+  return voxels * report.voxel.prod();
+}
+
+/// Peak and median are those of level 0; where a finer level has a greater norm, that is the peak.
 void report_sampled(const TensorGrid& grid, SamplingReport& report) {
   Norms norms;
-  for (const TensorBlock& block : grid.blocks) {
-    for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset)
-      if (block.active[offset]) norms.push_back(block.values[offset].cast<double>().norm());
-  }
+  const auto add = [&](const TensorBlocks& blocks) {
+    for (const TensorBlock& block : blocks)
+      for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset)
+        if (block.active[offset]) norms.push_back(block.values[offset].cast<double>().norm());
+  };
+  add(grid.blocks);
   report.active = norms.size();
+  report.volume = volume_of(grid.blocks, report);
   std::tie(report.sampled_peak, report.sampled_median) = peak_and_median(norms);
+  norms.clear();
+  for (const TensorBlocks& blocks : grid.finer) add(blocks);
+  report.sampled_peak = std::max(report.sampled_peak, peak_and_median(norms).first);
+}
+
+MeshSource on_lattice(const MeshSource& source, const SamplingLattice& lattice) {
+  return {source.mesh, source.point_tensors, source.cell_tensors, source.solid,
+          lattice,     source.layers,        source.tolerance};
+}
+
+/// A level is refined where cells are smaller than its voxels and it differs from the mesh. Voxels whose size the user
+/// did not set are no more than a few times those of level 0 at most.
+void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settings, const Progress& progress,
+                      TensorGrid& grid, SamplingReport& report) {
+  constexpr double rounded_one = 1 + 1e-6, bricks_of_all = 1 << 18, bricks_of_chosen = 1 << 11;
+  constexpr int largest = 1 << 28;  // Of a lattice along an axis.
+  if (settings.flat_axis >= 0) return;
+  const bool is_chosen = settings.resolution.index() == 0 && !settings.finest;
+  const double error = is_adaptive(coarsest.solid) && !settings.error ? 0 : settings.error.value_or(default_error);
+  report.wanted_error = error;
+  const std::vector<float> sizes = cell_sizes(coarsest);
+  SamplingLattice lattice = coarsest.lattice;
+  BlockPlaces places(lattice.size);
+  std::size_t bricks = 0;
+  for (int level = 1; level < settings.levels.value_or(max_levels); ++level) {
+    if (lattice.size.maxCoeff() > largest || settings.finest.value_or(0) > 0.5 * rounded_one * lattice.voxel.minCoeff())
+      return;
+    const MeshSource source = on_lattice(coarsest, lattice);
+    const TensorBlocks& blocks = level == 1 ? grid.blocks : grid.finer.back();
+    const double tolerance = error * report.native_peak * std::pow(2, level - 1);
+    const auto missed = missed_cells({source, places, blocks}, sizes, tolerance);
+    const std::vector<bool> refined = bricks_to_refine(lattice, places, missed);
+    const auto count = static_cast<std::size_t>(std::count(refined.begin(), refined.end(), true));
+    if (count == 0) return;
+    bricks += count;
+    report.is_too_large = static_cast<double>(bricks) > (is_chosen ? bricks_of_chosen : bricks_of_all);
+    if (report.is_too_large) return;
+    const SamplingLattice half = finer(lattice);
+    places = BlockPlaces(half.size, places, refined);
+    lattice = half;
+    std::size_t overlaid = 0;
+    TensorBlocks filled =
+        mesh_blocks(on_lattice(coarsest, lattice), places, voxels_about(lattice, places, missed), progress, overlaid);
+    remove_empty_blocks(filled);
+    if (filled.empty()) return;
+    grid.finer.push_back(std::move(filled));
+    LevelReport& of_level = report.finer.emplace_back();
+    of_level.voxel = lattice.voxel.minCoeff();
+    of_level.bricks = count;
+    for (const TensorBlock& block : grid.finer.back()) of_level.active += block.active.count();
+  }
 }
 
 }  // namespace
@@ -100,11 +171,12 @@ TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const
                           tolerance};
   TensorGrid grid;
   grid.to_world = Eigen::Translation3d(lattice.origin) * Eigen::Scaling(lattice.voxel);
-  grid.blocks = mesh_blocks(source, progress, report.overlaid);
-  remove_empty_blocks(grid);
+  grid.blocks = mesh_blocks(source, BlockPlaces(lattice.size), {}, progress, report.overlaid);
+  remove_empty_blocks(grid.blocks);
   report.size = lattice.size;
   report.voxel = lattice.voxel;
   report_native(source, sampled_box(solid, settings), report);
+  add_finer_levels(source, settings, progress, grid, report);
   report_sampled(grid, report);
   if (report.active == 0)
     throw std::invalid_argument(

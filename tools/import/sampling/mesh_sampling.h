@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -18,10 +19,19 @@ namespace tensorray {
 struct SamplingSettings {
   /// The number of voxels along the longest edge (int), the numbers along x, y, z (>= 2 each), or the edge of a voxel
   /// (double). If none is given, a voxel is about as large as the median cell, and fits between the two sides of a thin
-  /// mesh, with at most 2^21 voxels.
+  /// mesh, with at most 2^21 voxels; on level 0 it is larger by a power of two where that fits the large cells.
   std::variant<std::monostate, int, Eigen::Vector3i, double> resolution;
+  std::optional<int> levels;     ///< At most so many, 1 to max_levels; none: max_levels.
+  std::optional<double> finest;  ///< The least edge of a voxel; none: that of the last level.
+  std::optional<double> error;   ///< Of ‖T‖, as a part of the mesh's peak, from which on bricks are refined.
   std::optional<Eigen::AlignedBox3d> bounds;  ///< World; default: bounds of the three-dimensional cells.
   int flat_axis = -1;  ///< The axis across a slab (flat_mesh.h), along which there is one voxel; -1: none.
+};
+
+/// A level of finer voxels.
+struct LevelReport {
+  double voxel = 0;
+  std::size_t active = 0, bricks = 0;  ///< Bricks of the level before that it refines.
 };
 
 struct SamplingReport {
@@ -32,6 +42,10 @@ struct SamplingReport {
   double native_peak = 0, native_median = 0;  ///< ‖T‖ (Frobenius) of the used cells, or their points, in `bounds`.
   double sampled_peak = 0, sampled_median = 0;  ///< ‖T‖ at the active voxels.
   std::size_t overlaid = 0;                     ///< Voxels that lie in several blocks, which overlap.
+  std::vector<LevelReport> finer;               ///< Levels from 1 on.
+  double volume = 0;                            ///< Of the active voxels of level 0, world units.
+  double wanted_error = 0;                      ///< That was given or chosen.
+  bool is_too_large = false;                    ///< Whether a level is left out, as it would have too many voxels.
   std::size_t non_finite = 0;                   ///< Of those cells or points: whose tensor is not finite.
 };
 

@@ -49,6 +49,9 @@ double typical_edge(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& bo
   return std::cbrt(*middle);
 }
 
+/// Cells that are a little smaller than voxels are as large.
+constexpr double rounded_size = 1.02;
+
 /// Voxels that fit along edges, from one end. Doubles, because the numbers may exceed all integers.
 Vector3d voxels_along(const Vector3d& edges, double voxel) {
   constexpr double rounding = 1e-6;  // keeps a last voxel that is beyond the end only by rounding
@@ -60,6 +63,39 @@ bool is_small(const Vector3d& voxels) {
   constexpr double block = 8;
   const double stored = (block * (voxels / block).array().ceil()).prod();
   return voxels.prod() <= max_chosen_voxels && stored <= 8 * max_chosen_voxels;
+}
+
+/// The edge that half of the mesh's volume does not exceed, of cells that meet `bounds`.
+double edge_by_volume(const Solid& solid, const AlignedBox3d& bounds) {
+  std::vector<float> edges;
+  double volume = 0;
+  for (std::size_t i = 0; i < solid.edges.size(); ++i)
+    if (!solid.boxes[i].isEmpty() && solid.edges[i] > 0 && solid.boxes[i].intersects(bounds)) {
+      edges.push_back(solid.edges[i]);
+      volume += std::pow(solid.edges[i], 3.0);
+    }
+  std::sort(edges.begin(), edges.end());
+  double below = 0;
+  for (const float edge : edges)
+    if ((below += std::pow(edge, 3.0)) >= 0.5 * volume) return edge;
+  return 0;
+}
+
+/// The voxels of level 0: twice as large, and so on, while that is no larger than the large cells, and fits in the box.
+double doubled(double voxel, const Solid& solid, const AlignedBox3d& box, const SamplingSettings& settings) {
+  double large = edge_by_volume(solid, box);
+  for (int axis = 0; axis < 3; ++axis)
+    if (axis != settings.flat_axis) large = std::min(large, box.sizes()[axis]);
+  for (int level = 1; level < settings.levels.value_or(max_levels) && 2 * voxel <= rounded_size * large; ++level)
+    voxel *= 2;
+  return voxel;
+}
+
+/// Of adaptive refinement: the voxels of level 0 are the largest cells, if these are not too many.
+double largest_cell(const Solid& solid, const AlignedBox3d& box) {
+  double voxel = *std::max_element(solid.edges.begin(), solid.edges.end());
+  while (!is_small(voxels_along(box.sizes(), voxel))) voxel *= 2;
+  return voxel;
 }
 
 double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& box) {
@@ -92,8 +128,7 @@ Solid solid_part(vtkDataSet& mesh) {
   solid.boxes.resize(static_cast<std::size_t>(count));
   solid.thickness.resize(solid.boxes.size());
   std::vector<AlignedBox3d> hulls(solid.boxes.size());
-  const bool has_layers = mesh.GetCellData()->HasArray(layer_array) != 0;
-  std::vector<float> edges(has_layers ? solid.boxes.size() : 0);
+  solid.edges.resize(solid.boxes.size());
   std::vector<std::atomic<bool>> used(static_cast<std::size_t>(mesh.GetNumberOfPoints()));
   MeshCell first;
   if (count > 0) first.load(mesh, 0);  // makes VTK's cached data on one thread
@@ -103,8 +138,8 @@ Solid solid_part(vtkDataSet& mesh) {
       if (!cell.load(mesh, id)) continue;
       solid.boxes[static_cast<std::size_t>(id)] = cell.box();
       solid.thickness[static_cast<std::size_t>(id)] = static_cast<float>(cell.thickness(Vector3d::Ones()));
-      if (const double edge = has_layers ? cell.edge() : NAN; std::isfinite(edge))
-        edges[static_cast<std::size_t>(id)] = static_cast<float>(edge);
+      if (const double edge = cell.edge(); std::isfinite(edge))
+        solid.edges[static_cast<std::size_t>(id)] = static_cast<float>(edge);
       for (int i = 0; i < cell.points(); ++i) {
         hulls[static_cast<std::size_t>(id)].extend(cell.positions().col(i));
         used[static_cast<std::size_t>(cell.point(i))].store(true, std::memory_order_relaxed);
@@ -113,11 +148,28 @@ Solid solid_part(vtkDataSet& mesh) {
   });
   for (const AlignedBox3d& hull : hulls) solid.bounds.extend(hull);
   solid.points.assign(used.begin(), used.end());
-  solid.coarseness = coarseness_of(edges);
+  solid.coarseness = coarseness_of(solid.edges);
   if (solid.bounds.isEmpty())
     throw std::invalid_argument(
         "the mesh has no three-dimensional cells (it is flat, or points alone): a field needs tensors in a volume");
   return solid;
+}
+
+bool is_adaptive(const Solid& solid) {
+  constexpr double rounding = 0.02;
+  const float largest = solid.edges.empty() ? 1 : *std::max_element(solid.edges.begin(), solid.edges.end());
+  bool differ = false;
+  for (const float edge : solid.edges) {
+    if (!(edge > 0)) continue;
+    const double halvings = std::log2(largest / edge);
+    if (std::abs(halvings - std::round(halvings)) > rounding) return false;
+    differ = differ || halvings > 0.5;
+  }
+  return differ;
+}
+
+SamplingLattice finer(const SamplingLattice& lattice) {
+  return {lattice.origin, 0.5 * lattice.voxel, 2 * lattice.size - Vector3i::Ones()};
 }
 
 AlignedBox3d sampled_box(const Solid& solid, const SamplingSettings& settings) {
@@ -145,7 +197,13 @@ SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const Sam
     size = voxels_along(box.sizes(), voxel);
     lattice.voxel.setConstant(voxel);
   };
-  std::visit(Overloaded{[&](std::monostate) { set_voxel(chosen_voxel(mesh, solid, box)); },
+  std::visit(Overloaded{[&](std::monostate) {
+                          const bool is_amr = !settings.finest && settings.levels != 1 && is_adaptive(solid);
+                          const double least = settings.finest ? *settings.finest
+                                               : is_amr        ? largest_cell(solid, box)
+                                                               : chosen_voxel(mesh, solid, box);
+                          set_voxel(std::min(is_amr ? least : doubled(least, solid, box, settings), longest));
+                        },
                         [&](int count) {
                           require_two(count);
                           set_voxel(longest / (count - 1));

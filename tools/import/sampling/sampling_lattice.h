@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "tools/import/sampling/block_places.h"
 #include "tools/import/sampling/mesh_sampling.h"
 
 namespace tensorray {
@@ -14,7 +15,8 @@ namespace tensorray {
 struct Solid {
   std::vector<Eigen::AlignedBox3d> boxes;  ///< Box of each cell of the mesh; empty for cells that are not used.
   std::vector<float> thickness;            ///< Of each used cell, world units: MeshCell::thickness.
-  std::vector<int> coarseness;             ///< Of cells in layers: 0 for the largest, −4 for half of its edge, ...
+  std::vector<float> edges;                ///< Of each used cell: MeshCell::edge.
+  std::vector<int> coarseness;             ///< Of cells: 0 for the largest, −4 for half of its edge, ...
   Eigen::AlignedBox3d bounds;              ///< Bounds of the points of the used cells.
   std::vector<bool> points;                ///< For each point of the mesh: whether a used cell has it.
 };
@@ -33,6 +35,12 @@ struct SamplingLattice {
   }
 };
 
+/// The lattice of the next level: half of the voxels' edges; every voxel is also one of this.
+SamplingLattice finer(const SamplingLattice& lattice);
+
+/// Whether cells have at least two sizes, which differ by powers of two: those of adaptive refinement.
+bool is_adaptive(const Solid& solid);
+
 /// What is sampled: the bounds that the user gives, else those of the mesh; of a slab, its whole thickness.
 Eigen::AlignedBox3d sampled_box(const Solid& solid, const SamplingSettings& settings);
 
@@ -50,8 +58,10 @@ struct MeshSource {
   double tolerance;   ///< Distance from a cell below which a voxel's centre is in it.
 };
 
-/// The blocks that may have active voxels, as sample_mesh (mesh_sampling.h) describes them, ordered by origin.
+/// Those of the blocks that may have active voxels, as sample_mesh (mesh_sampling.h) describes them, ordered by origin.
+/// @param wanted  By number of the block, the voxels that may become active; empty: all.
 /// @param overlaid  Becomes the number of voxels that are in several layers.
-TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress, std::size_t& overlaid);
+TensorBlocks mesh_blocks(const MeshSource& source, const BlockPlaces& places, const std::vector<VoxelSet>& wanted,
+                         const Progress& progress, std::size_t& overlaid);
 
 }  // namespace tensorray

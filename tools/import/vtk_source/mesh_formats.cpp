@@ -216,6 +216,7 @@ const std::vector<MeshFormat>& mesh_formats() {
       {"an XDMF file", "", {".xdmf", ".xmf", ".xdmf2", ".xdmf3"}, open_xdmf, true},
       {"a VTKHDF file", "", {".vtkhdf", ".hdf"}, open_vtkhdf, true},
       {"a VTK multi-block file", "vtkMultiBlockDataSet", {".vtm"}},
+      {"a VTK file of adaptive refinement", "vtkOverlappingAMR", {".vth", ".vthb"}},
       {"a ParaView collection", "Collection", {".pvd"}},
       {"a series of files", "", {".series"}},
   };

@@ -1,0 +1,184 @@
+// Levels of finer voxels, as the cells of a mesh ask.
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <vtkCellData.h>
+
+#include "tests/import/mesh_fixtures.h"
+#include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/sampling/mesh_sampling.h"
+
+namespace tensorray {
+namespace {
+
+using namespace mesh_fixtures;
+using Profile = std::function<double(const Vector3d&)>;
+
+constexpr int families[] = {VTK_HEXAHEDRON,      VTK_LAGRANGE_HEXAHEDRON, VTK_WEDGE, VTK_PYRAMID, VTK_TETRA,
+                            VTK_QUADRATIC_TETRA, VTK_QUADRATIC_HEXAHEDRON};
+
+/// Cells become thin towards x = 0: from 0.27 down to 0.0025, if they are 16.
+Vector3d graded(const Vector3d& p) { return {std::expm1(5 * p.x()) / std::expm1(5), p.y(), p.z()}; }
+
+/// Cells become small towards the centre of the cube along each axis: a sixth of those of an even mesh.
+Vector3d towards_centre(const Vector3d& p) {
+  return (p.array() - 0.5).unaryExpr([](double t) { return 0.5 + t * (1 + 20 * t * t) / 6; }).matrix();
+}
+
+double thin_layer(const Vector3d& p) { return std::exp(-p.x() / 0.05); }
+double fine_spot(const Vector3d& p) { return std::exp(-(p - Vector3d::Constant(0.5)).squaredNorm() / (0.06 * 0.06)); }
+
+Grid mesh_of(int type, int n, const Map& map, const Profile& profile) {
+  Grid mesh = unit_cube(type, n, map);
+  add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) { return flat(Matrix3d::Identity() * profile(p)); });
+  return mesh;
+}
+
+SamplingSettings voxels_of(double size, std::optional<int> levels = {}) {
+  SamplingSettings settings;
+  settings.resolution = size;
+  settings.levels = levels;
+  return settings;
+}
+
+struct Sampled {
+  TensorGrid grid;
+  SamplingReport report;
+
+  /// A level as a grid of its own.
+  TensorGrid level(std::size_t number) const {
+    TensorGrid result;
+    result.blocks = number == 0 ? grid.blocks : grid.finer[number - 1];
+    result.to_world = grid.to_world * Eigen::Scaling(std::pow(0.5, number));
+    return result;
+  }
+};
+
+Sampled sampled_with_levels(vtkDataSet& mesh, const SamplingSettings& settings) {
+  Sampled result;
+  result.grid = sample_mesh(mesh, settings, Progress(), result.report);
+  EXPECT_EQ(result.grid.finer.size(), result.report.finer.size());
+  return result;
+}
+
+/// What voxels of a level differ from a profile by at most, and the farthest of their centres along x.
+std::pair<double, double> worst_and_farthest(const TensorGrid& grid, const Profile& profile) {
+  double worst = 0, farthest = 0;
+  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+    worst = std::max(worst, (tensor - Matrix3d::Identity() * profile(p)).cwiseAbs().maxCoeff());
+    farthest = std::max(farthest, p.x());
+  });
+  return {worst, farthest};
+}
+
+TEST(MeshLevels, ALayerAtAWallHasFinerVoxelsInCellsOfEveryFamily) {
+  for (const int type : families) {
+    SCOPED_TRACE(type);
+    const Grid mesh = mesh_of(type, 16, graded, thin_layer);
+    const Sampled one = sampled_with_levels(*mesh, voxels_of(1.0 / 16, 1));
+    const Sampled all = sampled_with_levels(*mesh, voxels_of(1.0 / 16));
+    EXPECT_TRUE(one.grid.finer.empty());
+    ASSERT_GE(all.grid.finer.size(), 2u);
+    for (std::size_t level = 1; level <= all.grid.finer.size(); ++level) {
+      EXPECT_NEAR(all.report.finer[level - 1].voxel, 1.0 / 16 / std::pow(2, level), 1e-9);
+      const auto [worst, farthest] = worst_and_farthest(all.level(level), thin_layer);
+      EXPECT_LT(farthest, 0.5) << level;  // Where cells are larger than 1/16, or the layer has ended.
+      EXPECT_LT(worst, level == 1 ? 0.05 : 0.03) << level;
+    }
+    EXPECT_GT(all.report.sampled_peak, 0.97 * all.report.native_peak);
+    EXPECT_LT(one.report.sampled_peak, 0.95 * one.report.native_peak);
+    for (std::size_t i = 0; i < one.grid.blocks.size(); ++i)  // Level 0 alone is the field of one level.
+      EXPECT_TRUE(one.grid.blocks[i].values == all.grid.blocks[i].values);
+  }
+}
+
+TEST(MeshLevels, LinearFieldsEvenCellsAndLargeCellsHaveOneLevel) {
+  for (const int type : families) {
+    SCOPED_TRACE(type);
+    const Grid linear = unit_cube(type, 12, graded);
+    add_array<9>(*linear, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
+    EXPECT_TRUE(sampled_with_levels(*linear, voxels_of(0.08)).grid.finer.empty());
+    const Grid even = mesh_of(
+        type, 12, [](const Vector3d& p) { return p; }, thin_layer);
+    for (const double voxel : {1.0 / 12, 0.03})
+      EXPECT_TRUE(sampled_with_levels(*even, voxels_of(voxel)).grid.finer.empty()) << voxel;
+  }
+}
+
+TEST(MeshLevels, AFineSpotIsRefinedWhereItIs) {
+  for (const int type : {VTK_HEXAHEDRON, VTK_TETRA}) {
+    const Grid mesh = mesh_of(type, 24, towards_centre, fine_spot);
+    const Sampled result = sampled_with_levels(*mesh, voxels_of(0.06));
+    ASSERT_GE(result.grid.finer.size(), 1u);
+    EXPECT_GT(result.report.sampled_peak, 0.97 * result.report.native_peak);
+    for (std::size_t level = 1; level <= result.grid.finer.size(); ++level)
+      for_each_voxel(result.level(level), [&](const Vector3d& p, const Matrix3d&) {
+        EXPECT_LT((p - Vector3d::Constant(0.5)).lpNorm<Eigen::Infinity>(), 0.36);
+      });
+  }
+}
+
+// With tensors at cells alone, these are compared at their centres.
+TEST(MeshLevels, TensorsOfCellsAndTheWantedErrorCount) {
+  const Grid mesh = unit_cube(VTK_HEXAHEDRON, 16, graded);
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(tensor_array);
+  array->SetNumberOfComponents(9);
+  for (vtkIdType i = 0; i < mesh->GetNumberOfCells(); ++i) {
+    const double value = thin_layer(Vector3d(mesh->GetCell(i)->GetBounds()[0], 0, 0));
+    array->InsertNextTuple9(value, 0, 0, 0, value, 0, 0, 0, value);
+  }
+  mesh->GetCellData()->AddArray(array);
+  std::size_t before = 0;
+  for (const double error : {0.9, 0.1, 0.01, 0.0}) {
+    SamplingSettings settings = voxels_of(1.0 / 16);
+    settings.error = error;
+    std::size_t voxels = 0;
+    for (const LevelReport& level : sampled_with_levels(*mesh, settings).report.finer) voxels += level.active;
+    EXPECT_GE(voxels, before) << error;
+    EXPECT_EQ(voxels > 0, error < 0.5) << error;
+    before = voxels;
+  }
+}
+
+TEST(MeshLevels, TheCoarsestAndTheFinestAreChosenOrGiven) {
+  const Grid mesh = mesh_of(VTK_HEXAHEDRON, 16, graded, thin_layer);
+  const SamplingReport chosen = sampled_with_levels(*mesh, {}).report;
+  SamplingSettings single;
+  single.levels = 1;
+  EXPECT_GE(chosen.voxel.x(), sampled_with_levels(*mesh, single).report.voxel.x());  // Half of the volume's cells.
+  SamplingSettings finest = voxels_of(1.0 / 16);
+  finest.finest = 1.0 / 32;
+  const Sampled two = sampled_with_levels(*mesh, finest);
+  EXPECT_EQ(two.grid.finer.size(), 1u);
+  finest.resolution = {};
+  const SamplingReport counted = sampled_with_levels(*mesh, finest).report;
+  EXPECT_NEAR(std::log2(counted.voxel.x() * 32), std::round(std::log2(counted.voxel.x() * 32)), 1e-9);
+  const Grid even = mesh_of(
+      VTK_HEXAHEDRON, 16, [](const Vector3d& p) { return p; }, thin_layer);
+  EXPECT_NEAR(sampled_with_levels(*even, {}).report.voxel.x(), 1.0 / 16, 1e-9);
+}
+
+TEST(MeshLevels, AreTheSameOnAnyNumberOfThreads) {
+  const Grid mesh = mesh_of(VTK_TETRA, 10, graded, thin_layer);
+  std::vector<TensorGrid> grids;
+  for (const std::size_t threads : {1u, 3u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    grids.push_back(sampled_with_levels(*mesh, voxels_of(0.1)).grid);
+  }
+  ASSERT_FALSE(grids[0].finer.empty());
+  ASSERT_EQ(grids[0].finer.size(), grids[1].finer.size());
+  for (std::size_t level = 0; level < grids[0].finer.size(); ++level) {
+    ASSERT_EQ(grids[0].finer[level].size(), grids[1].finer[level].size());
+    for (std::size_t k = 0; k < grids[0].finer[level].size(); ++k) {
+      EXPECT_EQ(grids[0].finer[level][k].origin, grids[1].finer[level][k].origin);
+      EXPECT_TRUE(grids[0].finer[level][k].values == grids[1].finer[level][k].values);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,346 @@
+// Rays through fields of several levels: against level 0 alone, against rays through the formula that the voxels were
+// sampled from, and packets against the reference.
+
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "tests/tracing/packet_support.h"
+#include "tracing/paths/paths.h"
+#include "tracing/trace/trace.h"
+#include "volumes/sampling/tensor_sampler.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::AlignedBox3d;
+using Eigen::AlignedBox3i;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+/// Chooses bricks by their middle, in voxels of level 0.
+using Place = std::function<bool(const Vector3d&)>;
+
+/// Adds a level to a grid, in the chosen bricks of the level before.
+/// @param tensor  Of a position in voxels of level 0.
+void refine(TensorGrid& grid, const Place& is_refined, const TensorFunction& tensor) {
+  const TensorBlocks& before = grid.finer.empty() ? grid.blocks : grid.finer.back();
+  const double voxel = std::ldexp(1, -static_cast<int>(grid.finer.size()) - 1);
+  const Vector3i last = grid.active_box().max();
+  std::map<std::array<int, 3>, TensorBlock> blocks;  // In the order of their origins.
+  for (const TensorBlock& parent : before) {
+    const Vector3d middle = 2 * voxel * (parent.origin.cast<double>() + Vector3d::Constant(4));
+    const Vector3d first = 2 * voxel * parent.origin.cast<double>();
+    if (!is_refined(middle) || (first.array() >= last.cast<double>().array().max(1)).any()) continue;
+    for (int child = 0; child < 8; ++child) {
+      TensorBlock block;
+      block.origin = 2 * parent.origin + 8 * Vector3i(child & 1, child >> 1 & 1, child >> 2);
+      block.active.set();
+      for (int i = 0; i < TensorBlock::voxels; ++i)
+        block.values[i] = tensor(voxel * (block.origin + TensorBlock::position(i)).cast<double>()).cast<float>();
+      blocks.emplace(std::array<int, 3>{block.origin.x(), block.origin.y(), block.origin.z()}, block);
+    }
+  }
+  TensorBlocks& level = grid.finer.emplace_back();
+  for (const auto& [origin, block] : blocks) level.push_back(block);
+}
+
+/// The box without an octant: an L in each section.
+bool in_l(const Vector3d& p) { return (p.array() > 16).count() < 2; }
+bool near_corner(const Vector3d& p) { return in_l(p) && (p.array() < 20).all(); }
+
+/// Waves of 24 to 64 voxels, and in finer levels of half and of a quarter of these lengths, too.
+Matrix3d waves(const Vector3d& p, int level) {
+  Matrix3d T = smooth_tensor(41)(p);
+  if (level > 0) T += 0.3 * smooth_tensor(42)(2 * p);
+  if (level > 1) T += 0.2 * smooth_tensor(43)(4 * p);
+  return T / mean_edge;
+}
+
+TensorGrid waves_grid(const AlignedBox3i& box, const Lattice& lattice, int levels) {
+  TensorGrid grid =
+      dense_grid(box, lattice.to_world, [](const Vector3i& index) { return waves(index.cast<double>(), 0); });
+  for (int level = 1; level < levels; ++level)
+    refine(grid, level == 1 ? in_l : near_corner, [&](const Vector3d& p) { return waves(p, level); });
+  return grid;
+}
+
+AlignedBox3i usual_box() { return index_box({0, 0, 0}, {33, 33, 33}); }
+
+TensorField waves_field(const Lattice& lattice, int levels = 3) {
+  return cubic_field(waves_grid(usual_box(), lattice, levels));
+}
+
+/// Light along axes, diagonals and faces of bricks of all levels, exactly and nearly; and at random.
+RayBatch rays_of_all_kinds(const TensorField& field, const std::vector<double>& flexibilities) {
+  RayBatch rays;
+  const Vector3d ways[] = {{1, 0, 0}, {0, 1, 0},  {0, 0, -1},   {1, 1, 0},        {0, 1, -1},
+                           {1, 1, 1}, {1, -1, 1}, {1, 1e-3, 0}, {1e-3, 1, -1e-3}, {3, 1, 2}};
+  for (const Vector3d& way : ways)
+    for (const double at : {0.0, 2.0, 4.0, 8.0, 12.0, 16.0, 17.3, 24.0, 32.0})
+      for (const double beside : {-1e-4, 0.0, 1e-4}) {
+        const Vector3d through = Vector3d::Constant(std::min(std::max(at + beside, 0.0), 32.0));
+        add_bundle(rays, field, through + 60 * Vector3d(0, 0, beside) - 70 * way.normalized(), way, flexibilities);
+      }
+  const RayBatch others = random_rays(field, 40, flexibilities, 49);
+  for (std::size_t i = 0; i < others.size(); ++i)
+    rays.add(others.position[i], others.direction[i], others.flexibility[i]);
+  return rays;
+}
+
+using RaysThroughLevels = EveryInstructionSet;
+INSTANTIATE_TEST_SUITE_P(All, RaysThroughLevels, test::instruction_sets(), instruction_set_name);
+
+TEST_P(RaysThroughLevels, PacketsAreTheReference) {
+  for (const Lattice& lattice : tested_lattices()) {
+    for (const double step : {0.25, 1.0, 4.0}) {
+      TensorField field = waves_field(lattice);
+      ASSERT_EQ(field.levels(), 3);
+      RayBatch rays = rays_of_all_kinds(field, wavelengths(0.02));
+      expect_reference(
+          make_scene(lattice.name + ", step " + std::to_string(step), std::move(field), {}, step, std::move(rays)),
+          0.2);
+    }
+    for (const double kick : {1e-3, 0.05, 1.0}) {
+      TensorField field = waves_field(lattice);
+      RayBatch rays = rays_of_all_kinds(field, wavelengths(kick));
+      Scene scene = make_scene(lattice.name + ", kick " + std::to_string(kick), std::move(field), {}, 0, rays);
+      if (kick > 0.1) scene.settings.max_length = 1;  // World units: 20 voxels.
+      expect_as_exact_as_reference(scene);
+    }
+  }
+}
+
+TEST_P(RaysThroughLevels, OneVoxelAlongAnAxisAndExtentsOfAnySize) {
+  for (const Lattice& lattice : tested_lattices())
+    for (const AlignedBox3i& box : {index_box({7, -1, 0}, {1, 30, 20}), index_box({0, 3, 8}, {30, 1, 1}), odd_box(),
+                                    index_box({-5, -3, -1}, {12, 11, 7})}) {
+      TensorGrid grid = waves_grid(box, lattice, 1);
+      refine(grid, in_l, [&](const Vector3d& p) { return waves(p, 1); });
+      TensorField field = cubic_field(grid);
+      RayBatch rays = random_rays(field, 40, wavelengths(0.05), 47);
+      expect_as_exact_as_reference(make_scene(lattice.name, std::move(field), {}, 0, std::move(rays)));
+    }
+}
+
+TEST_P(RaysThroughLevels, SurfacesAndCutsWithinFineBricks) {
+  for (const Lattice& lattice : tested_lattices())
+    for (const bool with_cut : {false, true}) {
+      Surfaces surfaces;
+      if (with_cut) surfaces.cut = box_mesh({Vector3d(2.3, 3.1, 1.7), Vector3d(30.2, 22.9, 29)}, lattice.to_world);
+      surfaces.obstacles.push_back(box_mesh({Vector3d(5.2, 6.3, 5.1), Vector3d(9.1, 9.9, 11.3)}, lattice.to_world));
+      TensorField field = waves_field(lattice);
+      RayBatch rays = random_rays(field, 80, wavelengths(0.02), 51);
+      expect_as_exact_as_reference(
+          make_scene(lattice.name + (with_cut ? ", cut" : ""), std::move(field), surfaces, 0, std::move(rays)));
+    }
+}
+
+/// Alone, in a batch, and in any order: what becomes of a ray does not depend on the others, nor on threads.
+TEST_P(RaysThroughLevels, ARayDoesNotDependOnTheOthers) {
+  TensorField field = waves_field(lattices()[2]);
+  const RayBatch rays = rays_of_all_kinds(field, {0.02, 0.05});
+  const Scene scene = make_scene("alone", std::move(field), {}, 0, rays);
+  const RayBatch together = traced(scene, rays);
+  for (std::size_t i = 0; i < rays.size(); i += 7) {
+    RayBatch one;
+    one.add(rays.position[i], rays.direction[i], rays.flexibility[i]);
+    one = traced(scene, one);
+    EXPECT_TRUE(identical(one, 0, together, i)) << i;
+  }
+}
+
+TEST_P(RaysThroughLevels, DifferentialsAreThoseOfTheReference) {
+  TensorField field = waves_field(lattices()[2]);
+  RayBatch rays = random_rays(field, 60, {0.03}, 52);
+  RayDifferential start;
+  start.position << Vector3d::UnitX(), Vector3d::UnitY();
+  rays.differentials.assign(rays.size(), start);
+  const Scene scene = make_scene("differentials", std::move(field), {}, 0.5, rays);
+  const RayBatch fast = traced(scene, rays), exact = traced_by_reference(scene, rays);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (distance_in_voxels(fast.position[i], exact.position[i]) > 1e-3) continue;  // It grazes a face.
+    const double apart = (fast.differentials[i].position - exact.differentials[i].position).norm();
+    EXPECT_LT(apart, 3e-4 * exact.differentials[i].position.norm()) << i;
+  }
+}
+
+/// Light reaches no end in fields that cannot be followed, but it stops.
+TEST_P(RaysThroughLevels, NothingHangs) {
+  const double bad[] = {std::nan(""), std::numeric_limits<double>::infinity(), 1e30};
+  for (const double value : bad) {
+    TensorGrid grid = waves_grid(usual_box(), lattices()[0], 2);
+    grid.finer[0][20].values[100](1, 2) = static_cast<float>(value);
+    TensorField field = cubic_field(grid);
+    RayBatch rays = rays_of_all_kinds(field, {0.05, 1e30, std::nan("")});
+    rays.add({std::nan(""), 0, 0}, Vector3d::UnitX(), 0.1);
+    Scene scene = make_scene("bad", std::move(field), {}, 0, rays);
+    scene.settings.tolerance = 1e-3;
+    const RayBatch ends = traced(scene, rays);
+    EXPECT_EQ(ends.end.back(), RayEnd::degenerate);
+    for (const std::uint32_t steps : ends.steps) EXPECT_LE(steps, 1001u);
+  }
+}
+
+// Levels that add nothing.
+
+/// Level 0 alone, and refined with its own values.
+struct Redundant {
+  TensorGrid grid = dense_grid(usual_box(), lattices()[0].to_world,
+                               [](const Vector3i& index) { return waves(index.cast<double>(), 0); });
+  TensorField alone = cubic_field(grid), refined = cubic_field(with_levels());
+
+  TensorGrid with_levels() const {
+    TensorGrid all = grid;
+    const auto same = [&](const Vector3d& p) { return TensorSampler(alone).at(alone.to_world() * p); };
+    refine(all, in_l, same);
+    refine(all, near_corner, same);
+    return all;
+  }
+};
+
+TEST(LevelsThatAddNothing, RaysAndDifferentialsAreThoseOfLevelZero) {
+  const Redundant fields;
+  ASSERT_EQ(fields.refined.levels(), 3);
+  RayBatch rays = random_rays(fields.alone, 60, wavelengths(0.02), 53);
+  RayDifferential start;
+  start.position << Vector3d::UnitX(), Vector3d::UnitY();
+  const std::pair<BendingMethod, double> ways[] = {{BendingMethod::splitting4, 0.25},
+                                                   {BendingMethod::rk4, 0.125},
+                                                   {BendingMethod::dopri5, 0},
+                                                   {BendingMethod::splitting4, 0}};
+  for (const bool with_differentials : {false, true})
+    for (const auto& [method, step] : ways) {
+      if (with_differentials) rays.differentials.assign(rays.size(), start);
+      Scene scene = make_scene("alone", fields.alone, {}, step, rays);
+      scene.settings.method = method;
+      scene.settings.tolerance = 1e-8;
+      scene.settings.max_steps = 100000;
+      const RayBatch expected = traced_by_reference(scene, rays), fast = traced(scene, rays);
+      scene.field = fields.refined;
+      const RayBatch exact = traced_by_reference(scene, rays), packets = traced(scene, rays);
+      for (std::size_t i = 0; i < rays.size(); ++i) {
+        ASSERT_EQ(exact.end[i], expected.end[i]);
+        EXPECT_LT(distance_in_voxels(exact.position[i], expected.position[i]), 1e-6) << i << ", " << step;
+        // Each step of a packet rounds to 5e-7 of a voxel.
+        EXPECT_LT(distance_in_voxels(packets.position[i], fast.position[i]), 2e-5) << i << ", " << step;
+        if (!with_differentials) continue;
+        const double apart = (exact.differentials[i].position - expected.differentials[i].position).norm();
+        EXPECT_LT(apart, 1e-5 * expected.differentials[i].position.norm()) << i;
+      }
+    }
+}
+
+/// Tubes are made of the tensors along paths.
+TEST(LevelsThatAddNothing, PathsHaveTheSameTensors) {
+  const Redundant fields;
+  std::vector<PathSeed> seeds(20);
+  Numbers numbers(54);
+  for (PathSeed& seed : seeds) {
+    seed.position = fields.alone.to_world() * numbers.in(fields.alone.index_bounds());
+    seed.direction = numbers.direction();
+    seed.flexibility = 0.02;
+  }
+  const Geometry geometry(surfaces_of(fields.alone));
+  BendingSettings settings = settings_of(BendingMethod::splitting4, 0);
+  settings.tolerance = 1e-5;
+  const auto paths_in = [&](const TensorField& field) {
+    return trace_paths(field, geometry, settings, seeds, PathSettings(), Progress());
+  };
+  const std::vector<Path> expected = paths_in(fields.alone), paths = paths_in(fields.refined);
+  const double greatest = fields.alone.max_norm();
+  for (std::size_t i = 0; i < seeds.size(); ++i)
+    for (const bool is_last : {false, true}) {
+      const auto end_of = [&](const Path& path) { return is_last ? path.points.back() : path.points.front(); };
+      const PathPoint a = end_of(expected[i]), b = end_of(paths[i]);
+      EXPECT_LT(distance_in_voxels(a.position, b.position), 1e-4);
+      EXPECT_LT((a.tensor - b.tensor).norm(), 1e-4 * greatest);
+      EXPECT_LT((a.change - b.change).norm(), 1e-4 * 0.02 * greatest);
+    }
+}
+
+// Levels that follow a formula.
+
+/// Smooth, with a bump where the field is refined.
+Matrix3d bump(const Vector3d& p) {
+  Matrix3d T = 0.6 * std::sin(1.3 * p.x() + 0.5 * p.z()) * general_tensor();
+  const Vector3d axis(0.6, -0.48, 0.64);
+  return T + 1.2 * std::exp(-8 * (p - Vector3d(0.5, -0.1, 0.1)).squaredNorm()) * axis * axis.transpose();
+}
+
+/// The cube [-1, 1]³, refined where x > 0.
+TensorField half_refined(int voxels, int levels) {
+  TensorGrid grid = cube_grid(Vector3i::Constant(voxels), bump);
+  for (int level = 1; level < levels; ++level)
+    refine(
+        grid, [&](const Vector3d& p) { return p.x() > (voxels - 1) / 2; },
+        [&](const Vector3d& p) { return bump(grid.to_world * p); });
+  return cubic_field(grid);
+}
+
+/// The greatest error of rays within the refined half, and of rays that cross the face between the halves.
+std::array<double, 2> errors_of_rays(const TensorField& field) {
+  std::array<double, 2> errors{};
+  const Geometry geometry(surfaces_of(field));
+  BendingSettings settings = settings_of(BendingMethod::splitting4, 0.25);
+  settings.max_length = 1;
+  for (int i = 0; i < 12; ++i) {
+    const bool crosses = i % 2;
+    const Vector3d from = crosses ? Vector3d(-0.5, -0.4 + 0.07 * i, 0.1) : Vector3d(0.35 + 0.03 * i, -0.1, -0.5);
+    const Vector3d along = Vector3d(crosses ? 1 : 0.02 * i, 0.1, crosses ? 0.03 * i : 1).normalized();
+    const Ray truth = through_formula(bump, 0.6, from, along, 1);
+    const Ray ray = trace_one(field, geometry, settings, from, along, 0.6);
+    errors[crosses] =
+        std::max(errors[crosses], (ray.position + ray.direction - truth.position - truth.direction).norm());
+  }
+  return errors;
+}
+
+TEST(LevelsOfAFormula, ErrorsAreOfOrderFourInTheLocalVoxel) {
+  const auto coarse = errors_of_rays(half_refined(17, 1)), half = errors_of_rays(half_refined(17, 2)),
+             quarter = errors_of_rays(half_refined(17, 3)), fine = errors_of_rays(half_refined(33, 1)),
+             fine_half = errors_of_rays(half_refined(33, 2));
+  EXPECT_GT(std::log2(coarse[0] / half[0]), 3);
+  EXPECT_GT(std::log2(half[0] / quarter[0]), 3);
+  EXPECT_LT(half[0], 2 * fine[0]) << "as voxels of this size everywhere";
+  for (const int kind : {0, 1}) EXPECT_GT(std::log2(half[kind] / fine_half[kind]), 3) << kind;
+}
+
+/// Steps are long where voxels are coarse, and pass over nothing where they are fine: behind the face there is a sheet
+/// of few fine voxels.
+TEST(LevelsOfAFormula, StepsFollowTheVoxels) {
+  const Matrix3d weak = 0.02 * general_tensor() / mean_edge;
+  const auto sheet = [&](const Vector3d& p) {
+    Matrix3d T = weak;
+    T(1, 0) += std::exp(-2 * std::pow(p.x() - 34, 2)) / mean_edge;
+    return T;
+  };
+  const auto field_of_levels = [&](const Place& is_refined) {
+    TensorGrid grid =
+        dense_grid(index_box({0, 0, 0}, {65, 17, 17}), lattices()[0].to_world, [&](const Vector3i&) { return weak; });
+    for (int level = 0; level < 2; ++level) refine(grid, is_refined, sheet);
+    return cubic_field(grid);
+  };
+  const TensorField all = field_of_levels([](const Vector3d&) { return true; });
+  const TensorField some = field_of_levels([](const Vector3d& p) { return p.x() > 32 && p.x() < 40; });
+  RayBatch rays;
+  for (int i = 0; i < 50; ++i) add_bundle(rays, all, {-1 - 0.13 * i, 8, 4 + 0.1 * i}, {1, 0.01, 0}, {0.1, 0.3});
+  Scene scene = make_scene("all", all, {}, 0, rays);
+  scene.settings.tolerance = 1e-3;
+  const RayBatch expected = traced(scene, rays);
+  scene.field = some;
+  const RayBatch fast = traced(scene, rays), exact = traced_by_reference(scene, rays);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    EXPECT_LT(distance_in_voxels(fast.position[i], expected.position[i]), 0.02) << i;
+    EXPECT_LT(distance_in_voxels(exact.position[i], expected.position[i]), 0.02) << i;
+  }
+  EXPECT_LT(2 * fast.tensor_samples, expected.tensor_samples);
+  EXPECT_LT(2 * exact.tensor_samples, expected.tensor_samples);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,354 @@
+// Fields of several levels: what they reproduce, how smooth they are, and what is at borders.
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "tests/volumes/grid_support.h"
+#include "tests/volumes/level_support.h"
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/sampling/tensor_sampler.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox3d;
+using Eigen::AlignedBox3i;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+constexpr Interpolant smooth_fade{Interpolation::cubic, Border::fade},
+    smooth_extend{Interpolation::cubic, Border::extend};
+constexpr double rounding_of_levels = 1e-5;  // Of single precision, for values of 1 and subdivided coefficients.
+
+/// A cubic polynomial along each axis, of values of about 1.
+Matrix3d cubic_polynomial(const Vector3d& at) {
+  const auto along = [](double x, double a) { return 0.4 + x * (a + x * (0.5 - 0.8 * a * x)); };
+  Matrix3d T;
+  for (int i = 0; i < 9; ++i)
+    T.data()[i] = along(at.x() / 24, 0.3) * along(at.y() / 24, 0.1 * i) * along(at.z() / 24, 0.5 - 0.1 * i);
+  return T;
+}
+
+Matrix3d random_tensor(std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  return Matrix3d::NullaryExpr([&] { return uniform(random); });
+}
+
+/// A field and its derivatives at a position in voxels of level 0.
+struct Jet {
+  std::array<Matrix3d, 4> parts;  ///< Value, and slopes along x, y, z.
+};
+
+Jet jet_at(TensorSampler& sampler, const TensorField& field, const Vector3d& index) {
+  Jet jet;
+  std::array<Matrix3d, 2> slopes;
+  for (int pair = 0; pair < 2; ++pair) {
+    Eigen::Matrix<double, 3, 2> along;
+    along << field.to_world().linear().col(pair), field.to_world().linear().col(pair + 1);
+    jet.parts[0] = sampler.at(field.to_world() * index, along, slopes);
+    jet.parts[1 + pair] = slopes[0];
+    jet.parts[2 + pair] = slopes[1];
+  }
+  return jet;
+}
+
+struct RefinedCase {
+  const char* name;
+  AlignedBox3i box;
+  int levels;
+  Refines refines;
+};
+
+void PrintTo(const RefinedCase& c, std::ostream* out) { *out << c.name; }
+
+const AlignedBox3i three_bricks(Vector3i(0, 0, 0), Vector3i(24, 24, 24));
+
+std::vector<RefinedCase> refined_cases() {
+  const auto corner = [](const Vector3i& b) { return b == Vector3i(0, 0, 0) || b == Vector3i(1, 1, 1); };
+  return {
+      {"one brick in the middle", three_bricks, 2, [](const Vector3i& b) { return b == Vector3i(1, 1, 1); }},
+      {"half", three_bricks, 3, [](const Vector3i& b) { return b.x() == 0; }},
+      {"all", three_bricks, 2, [](const Vector3i&) { return true; }},
+      {"L", three_bricks, 3, [](const Vector3i& b) { return b.x() == 0 || b.y() == 0; }},
+      {"bricks that touch at a corner", three_bricks, 2, corner},
+      {"odd sizes", {Vector3i(-11, -3, 5), Vector3i(6, 12, 20)}, 2, [](const Vector3i& b) { return b.x() >= 0; }},
+      {"faces between halves of bricks",
+       {Vector3i(4, 0, 0), Vector3i(12, 12, 12)},
+       3,
+       [](const Vector3i& b) { return b.y() > 0; }},
+      {"four levels", {Vector3i(0, 0, 0), Vector3i(16, 8, 8)}, 4, [](const Vector3i& b) { return b.x() == 1; }},
+  };
+}
+
+Matrix3d wavy(const Vector3d& at) {
+  return Matrix3d::NullaryExpr([&](Eigen::Index row, Eigen::Index column) {
+    const double phase = 2.1 * static_cast<double>(row) + 0.9 * static_cast<double>(column);
+    return std::sin(0.5 * at.x() + 0.3 * at.y() + 0.2 * at.z() + phase);
+  });
+}
+
+float refined_scale(const RefinedCase& c, const Vector3i& brick) {
+  return c.refines(brick) ? static_cast<float>(1 << (c.levels - 1)) : 1.0f;
+}
+
+class RefinedFields : public testing::TestWithParam<RefinedCase> {};
+
+TEST_P(RefinedFields, CubicPolynomialsAreReproduced) {
+  const RefinedCase& c = GetParam();
+  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
+  to_world.linear() << 0.5, 0.1, 0, -0.2, 0.3, 0.05, 0, 0.1, 0.8;
+  const TensorField field(grid_of_levels(c.box, c.levels, c.refines, cubic_polynomial, to_world), smooth_fade);
+  EXPECT_EQ(field.levels(), c.levels);
+  TensorSampler sampler(field);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const double h = 1e-3;
+  for (int n = 0; n < 2000; ++n) {
+    Vector3d index;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double u = uniform(random), v = u < 0.1 ? 0 : u > 0.9 ? 1 : u > 0.8 ? 0.5 : uniform(random);
+      index[axis] = c.box.min()[axis] + v * c.box.sizes()[axis];
+    }
+    const Jet jet = jet_at(sampler, field, index);
+    EXPECT_LT((jet.parts[0] - cubic_polynomial(index)).norm(), rounding_of_levels) << index.transpose();
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vector3d step = h * Vector3d::Unit(axis);
+      const Matrix3d slope = (cubic_polynomial(index + step) - cubic_polynomial(index - step)) / (2 * h);
+      EXPECT_LT((jet.parts[1 + axis] - slope).norm(), 8 * rounding_of_levels) << index.transpose();
+    }
+  }
+}
+
+/// Across a face between levels, value, slopes and curvature go on: the one-sided differences of slopes agree.
+TEST_P(RefinedFields, RandomDetailsAreTwiceContinuouslyDifferentiable) {
+  const RefinedCase& c = GetParam();
+  std::mt19937 random(2);
+  TensorGrid grid = grid_of_levels(c.box, c.levels, c.refines, [&](const Vector3d&) { return Matrix3d::Zero(); });
+  for (TensorBlocks* blocks : levels_of(grid))
+    for (TensorBlock& block : *blocks)
+      for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+        if (block.active[offset]) block.values[offset] = random_tensor(random).cast<float>();
+  const TensorField field(grid, smooth_fade);
+  TensorSampler sampler(field);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const double near = 1e-4, scale = std::pow(2, field.levels() - 1);
+  for (int n = 0; n < 2000; ++n) {  // On the faces of the finest voxels, and across them.
+    Vector3d index = c.box.min().cast<double>();
+    for (int axis = 0; axis < 3; ++axis) index[axis] += uniform(random) * c.box.sizes()[axis];
+    const int axis = n % 3;
+    index[axis] = n % 2 ? std::round(index[axis] / 4) * 4 : std::round(scale * index[axis]) / scale;
+    if (index[axis] <= c.box.min()[axis] || index[axis] >= c.box.max()[axis]) continue;
+    const Vector3d step = near * Vector3d::Unit(axis);
+    const Jet before = jet_at(sampler, field, index - step), on = jet_at(sampler, field, index),
+              behind = jet_at(sampler, field, index + step);
+    for (int part = 0; part < 4; ++part) {
+      const Matrix3d first = (on.parts[part] - before.parts[part]) / near,
+                     second = (behind.parts[part] - on.parts[part]) / near;
+      const double bound =
+          60 * std::pow(scale, part == 0 ? 2 : 3) * near + 2e-6 * std::pow(scale, part == 0 ? 0 : 1) / near;
+      EXPECT_LT((first - second).norm(), bound) << index.transpose() << " part " << part;
+    }
+  }
+}
+
+/// Calls visit(position in voxels of level 0, value) at the voxels of the finest level that are at least `margin` of
+/// its voxels within the box of those voxels, or on the faces of the extent.
+template <class Visit>
+void visit_finest(const TensorGrid& grid, const AlignedBox3i& box, int margin, const Visit& visit) {
+  const int scale = 1 << grid.finer.size();
+  const AlignedBox3i finest = active_box(shapes_of(grid.finer.back()));
+  for (const TensorBlock& block : grid.finer.back())
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      const Vector3i index = block.origin + TensorBlock::position(offset);
+      bool inside = block.active[offset];
+      for (int axis = 0; axis < 3; ++axis) {
+        const bool low = index[axis] >= finest.min()[axis] + margin || finest.min()[axis] == scale * box.min()[axis];
+        const bool high = index[axis] <= finest.max()[axis] - margin || finest.max()[axis] == scale * box.max()[axis];
+        inside = inside && low && high;
+      }
+      if (inside) visit(Vector3d(index.cast<double>() / scale), Matrix3d(block.values[offset].cast<double>()));
+    }
+}
+
+TEST_P(RefinedFields, DeviatorsAreBounded) {
+  const RefinedCase& c = GetParam();
+  const TensorField field(grid_of_levels(c.box, c.levels, c.refines, wavy), smooth_fade);
+  TensorSampler sampler(field);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (int n = 0; n < 1000; ++n) {
+    Vector3d index = c.box.min().cast<double>();
+    for (int axis = 0; axis < 3; ++axis) index[axis] += uniform(random) * c.box.sizes()[axis];
+    const Vector3i brick = (index / 8).array().floor().cast<int>();
+    const Eigen::Vector3f from = (index - 8 * brick.cast<double>()).cast<float>();
+    const LeafBrick leaf = field.leaf(brick, {from.x(), from.y(), from.z()});
+    const Matrix3d T = sampler.at(index);
+    const double deviator = (T - T.trace() / 3 * Matrix3d::Identity()).norm();
+    EXPECT_LE(deviator, leaf.brick.strongest);
+    EXPECT_LE(leaf.brick.strongest, field.brick(brick).strongest);
+    EXPECT_EQ(leaf.scale, refined_scale(c, brick));
+  }
+}
+
+TEST_P(RefinedFields, ThreadsDoNotChangeBits) {
+  const RefinedCase& c = GetParam();
+  const TensorGrid grid = grid_of_levels(c.box, c.levels, c.refines, wavy);
+  std::vector<std::vector<float>> bricks;
+  for (const std::size_t threads : {1, 2}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const TensorField field(grid, smooth_extend);
+    const BrickMemory& memory = field.memory();
+    bricks.emplace_back(memory.floats.get(), memory.floats.get() + memory.count * memory.stride);
+  }
+  EXPECT_EQ(bricks[0], bricks[1]);
+}
+
+INSTANTIATE_TEST_SUITE_P(Levels, RefinedFields, testing::ValuesIn(refined_cases()));
+
+const auto first_half = [](const Vector3i& brick) { return brick.x() < 2; };
+
+/// In a box, details interpolate the level's values; level 0 is what it was without them.
+TEST(FinerBricks, ValuesAreInterpolatedAwayFromTheCoarserBricks) {
+  for (const Interpolant& interpolant : {smooth_fade, smooth_extend}) {
+    const AlignedBox3i box(Vector3i(0, 0, 0), Vector3i(32, 12, 10));
+    std::mt19937 random(4);
+    const TensorGrid grid = grid_of_levels(box, 2, first_half, [&](const Vector3d&) { return random_tensor(random); });
+    const TensorField field(grid, interpolant);
+    TensorSampler sampler(field);
+    std::size_t count = 0;
+    visit_finest(grid, box, 2, [&](const Vector3d& index, const Matrix3d& value) {
+      EXPECT_LT((sampler.at(index) - value).norm(), 2 * rounding_of_levels) << index.transpose();
+      ++count;
+    });
+    EXPECT_EQ(count, 30u * 25 * 21);
+  }
+}
+
+/// Where regions are no boxes, runs are solved one after the other, and corrected.
+TEST(FinerBricks, ValuesAreNearlyInterpolatedInRegionsThatAreNoBoxes) {
+  const AlignedBox3i box(Vector3i(0, 0, 0), Vector3i(24, 24, 24));
+  const auto refines = [](const Vector3i& b) { return b.x() == 0 || b.y() == 0; };
+  std::mt19937 random(5);
+  const TensorGrid grid = grid_of_levels(box, 2, refines, [&](const Vector3d&) { return random_tensor(random); });
+  const TensorField field(grid, smooth_fade);
+  TensorSampler sampler(field);
+  double greatest = 0;
+  visit_finest(grid, box, 2, [&](const Vector3d& index, const Matrix3d& value) {
+    const bool near_edge = (index.x() > 7 && index.y() > 7);
+    if (!near_edge) greatest = std::max(greatest, (sampler.at(index) - value).norm());
+  });
+  EXPECT_LT(greatest, 2e-2);
+}
+
+TEST(FinerBricks, TheErrorIsOfFourthOrderInTheLocalVoxel) {
+  double errors[2][2] = {};  // By resolution, in the refined half and in the other.
+  for (int fine = 0; fine < 2; ++fine) {
+    const int n = 32 << fine;
+    const double scale = 32.0 / n;
+    const auto formula = [&](const Vector3d& index) { return wavy(scale * index); };
+    const AlignedBox3i box(Vector3i::Zero(), Vector3i(n, n / 2, n / 2));
+    const TensorField field(grid_of_levels(
+                                box, 2, [&](const Vector3i& b) { return 8 * b.x() < n / 2; }, formula),
+                            smooth_fade);
+    TensorSampler sampler(field);
+    std::mt19937 random(6);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    for (int i = 0; i < 3000; ++i) {
+      const double u = uniform(random);
+      const Vector3d index(n * (u < 0.5 ? 0.85 * u : u), n * (0.25 + uniform(random) / 8),
+                           n * (0.25 + uniform(random) / 8));
+      double& error = errors[fine][u < 0.5 ? 0 : 1];
+      if (u > 0.55 || u < 0.5) error = std::max(error, (sampler.at(index) - formula(index)).norm());
+    }
+  }
+  for (int half = 0; half < 2; ++half) {
+    EXPECT_GT(errors[0][half] / errors[1][half], 12);
+    EXPECT_LT(errors[0][half] / errors[1][half], 24);
+  }
+  EXPECT_LT(errors[0][0], errors[0][1] / 10);
+}
+
+TEST(FinerBricks, LevelsWithoutDetailsChangeNothing) {
+  const AlignedBox3i box(Vector3i(0, 0, 0), Vector3i(20, 17, 16));
+  std::mt19937 random(7);
+  const TensorGrid coarse =
+      dense_grid(box, Eigen::Affine3d::Identity(), [&](const Vector3i& index) { return waves(index); });
+  const TensorField alone(coarse, smooth_fade);
+  TensorGrid grid = coarse;
+  for (int level = 1; level < 3; ++level)
+    add_level(
+        grid, box, [](const Vector3i& brick) { return brick.x() == 0; },
+        [&](const Vector3d& index) { return TensorSampler(alone).at(index); });
+  const TensorField field(grid, smooth_fade);
+  EXPECT_EQ(field.levels(), 3);
+  TensorSampler sampler(field), before(alone);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (int n = 0; n < 1000; ++n) {
+    const Vector3d index(20 * uniform(random), 17 * uniform(random), 16 * uniform(random));
+    EXPECT_LT((sampler.at(index) - before.at(index)).norm(), rounding_of_levels);
+  }
+}
+
+/// Of a body whose last voxel of level 1 is between two of level 0.
+TEST(FinerBricks, InactiveVoxelsAreContinuedAtTheirLevel) {
+  const AlignedBox3i box(Vector3i(0, 0, 0), Vector3i(24, 12, 12));
+  const auto line = [](const Vector3d& at) { return Matrix3d((1 + at.x() / 10) * Matrix3d::Ones()); };
+  TensorGrid grid = grid_of_levels(box, 2, first_half, line);
+  for (std::size_t level = 0; level < 2; ++level)
+    for (TensorBlock& block : *levels_of(grid)[level])
+      for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+        const int x = block.origin.x() + TensorBlock::position(offset).x();
+        if (x * (2 - static_cast<int>(level)) <= 21 || x == 24) continue;  // Inactive from 10.6 on, but for the end.
+        block.active.reset(static_cast<std::size_t>(offset));
+        block.values[static_cast<std::size_t>(offset)].setZero();
+      }
+  remove_empty_blocks(grid);
+  const TensorField extended(grid, smooth_extend), faded(grid, smooth_fade);
+  TensorSampler extend(extended), fade(faded);
+  for (const double x : {2.0, 9.3, 10.0, 10.4, 10.5, 10.9}) {
+    const Vector3d at(x, 6.2, 5.1);
+    EXPECT_LT((extend.at(at) - line(at)).norm(), 3 * rounding_of_levels) << x;
+  }
+  for (const double x : {2.0, 9.0, 10.0, 10.5}) {
+    const Vector3d at(x, 6, 5);
+    EXPECT_LT((fade.at(at) - line(at)).norm(), 3 * rounding_of_levels) << x;
+  }
+  EXPECT_LT(fade.at(Vector3d(13.5, 6, 5)).norm(), 1e-6);
+}
+
+TEST(FinerBricks, WhatRefinesNothingIsLeftOut) {
+  const AlignedBox3i box(Vector3i(0, 0, 0), Vector3i(16, 8, 8));
+  TensorGrid grid = grid_of_levels(
+      box, 2, [](const Vector3i& b) { return b.x() == 0; }, wavy);
+  add_level(
+      grid, box, [](const Vector3i& b) { return b.x() == 3; }, wavy);  // Not within level 1.
+  EXPECT_EQ(TensorField(grid, smooth_fade).levels(), 2);
+  grid.finer.resize(1);
+  for (TensorBlock& block : grid.finer[0]) block.origin.x() += 64;  // Beyond the extent.
+  EXPECT_EQ(TensorField(grid, smooth_fade).levels(), 1);
+  grid.finer.clear();
+  EXPECT_EQ(TensorField(grid, smooth_fade).levels(), 1);
+}
+
+TEST(FinerBricks, SeveralLevelsNeedCubicInterpolation) {
+  const TensorGrid grid = grid_of_levels(three_bricks, 2, first_half, wavy);
+  EXPECT_THROW(TensorField(grid, Interpolant{}), std::invalid_argument);
+}
+
+/// One level whose tensors are symmetric and one whose are not: all bricks store general tensors.
+TEST(FinerBricks, SymmetryIsThatOfAllLevels) {
+  const auto symmetric = [](const Vector3d& at) { return Matrix3d(wavy(at) + wavy(at).transpose()); };
+  TensorGrid grid = grid_of_levels(three_bricks, 2, first_half, symmetric);
+  EXPECT_TRUE(TensorField(grid, smooth_fade).is_symmetric());
+  grid.finer.clear();
+  add_level(grid, three_bricks, first_half, wavy);
+  EXPECT_FALSE(TensorField(grid, smooth_fade).is_symmetric());
+}
+
+}  // namespace
+}  // namespace tensorray
