@@ -139,6 +139,32 @@ inline void occluded(RTCScene scene, RTCRay& ray) {
 #endif
 }
 
+/// Bits of those of some rays that meet anything. All must be valid. @param is_coherent  Whether they go nearly alike.
+inline std::uint32_t occluded(RTCScene scene, RTCRay16& rays, std::uint32_t which, RTCFilterFunctionN filter,
+                              bool is_coherent) {
+  alignas(64) int valid[16];
+  for (int i = 0; i < 16; ++i) valid[i] = which >> i & 1 ? -1 : 0;
+  QueryContext context;
+#if RTC_VERSION_MAJOR >= 4
+  rtcInitRayQueryContext(&context);
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.flags = static_cast<RTCRayQueryFlags>(RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER |
+                                                  (is_coherent ? RTC_RAY_QUERY_FLAG_COHERENT : 0));
+  arguments.context = &context;
+  arguments.filter = filter;
+  rtcOccluded16(valid, scene, &rays, &arguments);
+#else
+  rtcInitIntersectContext(&context);
+  context.filter = filter;
+  if (is_coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcOccluded16(valid, scene, &context, &rays);
+#endif
+  std::uint32_t met = 0;
+  for (int i = 0; i < 16; ++i) met |= valid[i] && rays.tfar[i] < 0 ? 1u << i : 0;
+  return met;
+}
+
 /// Lets rays through a geometry, but for the part `opacity` of them. Which rays meet it is a function of the ray and
 /// the triangle alone. @param opacity  Must outlive the geometry.
 inline void let_through(RTCGeometry geometry, const float& opacity) {

@@ -4,6 +4,8 @@
 #include <limits>
 #include <tuple>
 
+#include <Eigen/Geometry>
+
 #include "renderer/surfaces/embree_handles.h"
 
 namespace tensorray {
@@ -13,6 +15,8 @@ using embree::check;
 using embree::Owned;
 
 constexpr float clear_of_edges = 1e-5f;  // Barycentric; Embree meets both triangles within 2e-7 of an edge.
+
+bool is_clear(float u, float v) { return std::min({u, v, 1 - u - v}) > clear_of_edges; }
 
 /// Sorts by mesh and triangle. Embree may report a triangle more than once if its search tree has split it.
 template <class Triangle>
@@ -27,6 +31,18 @@ void sort_and_join(std::vector<Triangle>& triangles) {
 bool add_candidate(RTCPointQueryFunctionArguments* arguments) {
   static_cast<std::vector<TriangleId>*>(arguments->userPtr)->push_back({arguments->geomID, arguments->primID});
   return false;  // The query's radius does not change.
+}
+
+/// Refuses triangles that are clearly met from outside.
+void take_outwards(const RTCFilterFunctionNArguments* all) {
+  constexpr float clear_slope = 0.1f;
+  for (unsigned i = 0; i < all->N; ++i) {
+    const Eigen::Vector3f normal(RTCHitN_Ng_x(all->hit, all->N, i), RTCHitN_Ng_y(all->hit, all->N, i),
+                                 RTCHitN_Ng_z(all->hit, all->N, i));
+    const Eigen::Vector3f along(RTCRayN_dir_x(all->ray, all->N, i), RTCRayN_dir_y(all->ray, all->N, i),
+                                RTCRayN_dir_z(all->ray, all->N, i));
+    if (normal.dot(along) < -clear_slope * normal.norm()) all->valid[i] = 0;
+  }
 }
 
 /// Distance at which a line enters the box; nothing if it does not meet the box.
@@ -150,7 +166,38 @@ std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, c
   RTCRayHit ray = state_->ray(from, direction, min_distance, max_distance);
   embree::intersect(state_->scene.get(), ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return TriangleHit{min_distance + ray.ray.tfar * state_->unit, ray.hit.geomID, ray.hit.primID};
+  return TriangleHit{min_distance + ray.ray.tfar * state_->unit, ray.hit.geomID, ray.hit.primID,
+                     is_clear(ray.hit.u, ray.hit.v)};
+}
+
+std::uint32_t TriangleScene::met(const Segment* segments, int count, double margin, bool outwards) const {
+  constexpr float near = 8;  // In lengths of the segments: rays that start so near to each other are coherent.
+  if (!state_->scene) return 0;
+  alignas(64) RTCRay16 rays{};
+  std::uint32_t valid = 0;
+  Eigen::AlignedBox3f starts;
+  float longest = 0;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d way = segments[i].to - segments[i].from;
+    const double length = way.norm();
+    const RTCRay ray = state_->ray(segments[i].from, way / length, -margin, length + margin).ray;
+    if (!embree::is_valid(ray)) continue;
+    valid |= 1u << i;
+    rays.org_x[i] = ray.org_x;
+    rays.org_y[i] = ray.org_y;
+    rays.org_z[i] = ray.org_z;
+    rays.dir_x[i] = ray.dir_x;
+    rays.dir_y[i] = ray.dir_y;
+    rays.dir_z[i] = ray.dir_z;
+    rays.tfar[i] = ray.tfar;
+    rays.mask[i] = ray.mask;
+    starts.extend(Eigen::Vector3f(ray.org_x, ray.org_y, ray.org_z));
+    longest = std::max(longest, ray.tfar);
+  }
+  const bool is_coherent = starts.diagonal().norm() < near * longest;
+  const auto filter = outwards ? take_outwards : nullptr;
+  const std::uint32_t others = ((1u << count) - 1) & ~valid;
+  return others | (valid == 0 ? 0 : embree::occluded(state_->scene.get(), rays, valid, filter, is_coherent));
 }
 
 void TriangleScene::crossings(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
@@ -159,9 +206,8 @@ void TriangleScene::crossings(const Eigen::Vector3d& from, const Eigen::Vector3d
   if (!state_->scene) return;
   if (!state_->begin(from, direction, max_distance, min_distance)) return;
   const auto add = [](void* user, const embree::MetTriangle& met) {
-    const bool is_clear = std::min({met.u, met.v, 1 - met.u - met.v}) > clear_of_edges;
     static_cast<std::vector<TriangleCrossing>*>(user)->push_back(
-        {met.distance, met.geometry, met.primitive, met.along > 0 ? 1 : -1, is_clear});
+        {met.distance, met.geometry, met.primitive, met.along > 0 ? 1 : -1, is_clear(met.u, met.v)});
   };
   embree::visit_all(state_->scene.get(), state_->ray(from, direction, min_distance, max_distance), add, &crossings);
   if (crossings.size() > 1) sort_and_join(crossings);

@@ -23,6 +23,7 @@ struct TriangleId {
 struct TriangleHit {
   double distance = 0;  ///< Along the unit direction, in single precision.
   std::uint32_t mesh = 0, triangle = 0;
+  bool is_clear = false;  ///< Not at an edge or a vertex.
 };
 
 /// One of the triangles that a line meets.
@@ -31,6 +32,11 @@ struct TriangleCrossing {
   std::uint32_t mesh = 0, triangle = 0;
   int sign = 0;           ///< 1: the line goes out, where normals point outwards; −1: in.
   bool is_clear = false;  ///< False at edges and vertices, where it may be counted twice.
+};
+
+/// A straight way.
+struct Segment {
+  Eigen::Vector3d from, to;
 };
 
 /// Immutable; any number of threads may query it at once. It keeps no reference to the meshes.
@@ -55,6 +61,12 @@ class TriangleScene {
   /// The nearest triangle between the two distances (world units; the first may be negative), from either side.
   std::optional<TriangleHit> nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
                                      double max_distance) const;
+
+  /// Bits of those of up to 16 segments, each longer by `margin` at both ends, that meet a triangle. It is fastest
+  /// where they lie together. Near edges, within single precision, it may depend on the other segments. Those with a
+  /// value that Embree cannot compute with are among them.
+  /// @param outwards  Triangles that are clearly met from outside do not count.
+  std::uint32_t met(const Segment* segments, int count, double margin, bool outwards) const;
 
   /// Sets `crossings` to all triangles between the two distances. Where none is in doubt, lines miss or meet a closed
   /// mesh consistently: the signs behind any point of the line add up to how often the mesh surrounds it.

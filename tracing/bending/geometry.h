@@ -13,6 +13,7 @@
 
 #include "base/geometry/triangle_mesh.h"
 #include "renderer/surfaces/plate.h"
+#include "renderer/surfaces/triangle_scene.h"
 
 namespace tensorray {
 
@@ -27,6 +28,12 @@ struct Hit {
   double distance = 0;  ///< Along the unit direction, world units, in double precision; see Geometry.
   Surface surface = Surface::plate;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< Unit, geometric; outwards for bounds, cut and obstacles.
+};
+
+/// Of the cut, ahead of light that goes straight from a point.
+struct CutAhead {
+  bool is_inside = false;    ///< Whether the light is inside just beyond the point.
+  std::optional<Hit> entry;  ///< If not, where it enters.
 };
 
 /// The parts of a Geometry.
@@ -61,6 +68,10 @@ class Geometry {
   /// Returns false only if no plate or obstacle can meet the segment; cheap.
   bool may_absorb(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 
+  /// Bits of those of up to 16 straight ways that may leave the cut or meet an absorber: of all that do, and of few
+  /// others. It is fastest where they lie together.
+  std::uint32_t may_meet(const Segment* ways, int count) const;
+
   /// A box around all parts of plates and obstacles that may lie in `region`; empty if there are none.
   Eigen::AlignedBox3d absorbers_within(const Eigen::AlignedBox3d& region) const;
 
@@ -76,11 +87,11 @@ class Geometry {
   const Surfaces& surfaces() const;
   bool has_cut() const { return surfaces().cut.has_value(); }
 
-  /// Whether light from a point is inside the cut just beyond it; true if there is no cut.
-  bool inside_cut(const Eigen::Vector3d& point, const Eigen::Vector3d& direction = generic_directions[0]) const;
-
-  /// Lower bound of the distance to the cut and the absorbers from a point in the volume; 0 if it is not known. Cheap.
-  double clearance(const Eigen::Vector3d& point) const;
+  /// If there is no cut, all is inside.
+  CutAhead cut_ahead(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const;
+  bool inside_cut(const Eigen::Vector3d& point, const Eigen::Vector3d& direction = generic_directions[0]) const {
+    return cut_ahead(point, direction).is_inside;
+  }
 
   /// Unit directions that are unlikely to meet an edge.
   static const std::array<Eigen::Vector3d, 3> generic_directions;

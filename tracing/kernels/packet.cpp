@@ -92,51 +92,76 @@ std::optional<Hit> first_hit(const Geometry& geometry, const Eigen::Vector3d& fr
   std::optional<Hit> hit;
   if (geometry.has_cut()) hit = geometry.crossing(Surface::cut, false, from, along, length);
   if (hit) length = hit->distance;
-  if (!geometry.may_absorb(from, from + length * along)) return hit;
   const auto absorber = geometry.absorber(from, along, length);
   return absorber ? absorber : hit;
 }
 
-/// Whether no surface is near the path of a step. All of it is near one of its ends.
-bool is_clear(const Geometry& geometry, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double length) {
-  const double rest = 1.001 * length - geometry.clearance(from);
-  return rest < 0 || rest < geometry.clearance(to);
+/// The chords of a step, world. Calls `use` with each and its number, until it returns true.
+template <class Use>
+void for_chords(const PacketMedium& medium, const LaneStep& step, int count, const Use& use) {
+  const auto at = [&](int i) -> Eigen::Vector3d {
+    const Eigen::Vector3d inner = i == 0 ? step.from : i == count ? step.to : step.at(path_weights(double(i) / count));
+    return medium.field.to_world() * (step.origin + inner);
+  };
+  Segment chord{at(0), at(0)};
+  for (int i = 0; i < count; ++i) {
+    chord = {chord.to, at(i + 1)};
+    if (use(i, chord)) return;
+  }
 }
 
 }  // namespace
+
+std::uint32_t near_surfaces(const PacketMedium& medium, const Packet& packet, std::uint32_t which) {
+  constexpr int most = 16;
+  const Geometry& geometry = *medium.settings.geometry;
+  Segment chords[most];
+  std::uint32_t lanes[most], near = 0;
+  int count = 0;
+  const auto test = [&] {
+    const std::uint32_t met = count > 0 ? geometry.may_meet(chords, count) : 0;
+    for (int i = 0; i < count; ++i)
+      if (met >> i & 1) near |= lanes[i];
+    count = 0;
+  };
+  for (int lane = 0; lane < packet_rays; ++lane) {
+    if (!(which >> lane & 1)) continue;
+    const LaneStep step(packet, lane);
+    if (!medium.settings.surfaces.intersects(step.bounds())) continue;
+    for_chords(medium, step, chords_of(step.voxels(), step.turn), [&](int, const Segment& chord) {
+      lanes[count] = 1u << lane;
+      chords[count++] = chord;
+      if (count == most) test();
+      return false;
+    });
+  }
+  test();
+  return near;
+}
 
 bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane, bool leaves,
                         SurfaceLanding& landing) {
   const LaneStep step(packet, lane);
   landing.part = 0;
-  if (!medium.settings.surfaces.intersects(step.bounds())) return false;
-  const Geometry& geometry = *medium.settings.geometry;
-  const auto to_world = [&](const Eigen::Vector3d& at) -> Eigen::Vector3d {
-    return medium.field.to_world() * (step.origin + at);
-  };
-  const Eigen::Vector3d first = to_world(step.from), last = to_world(step.to);
-  if (is_clear(geometry, first, last, step.time)) return false;
   const int count = chords_of(step.voxels(), step.turn);
-  Eigen::Vector3d begin = first;
-  for (int i = 1; i <= count; ++i) {
-    const Eigen::Vector3d end = i == count ? last : to_world(step.at(path_weights(double(i) / count)));
-    const double length = (end - begin).norm();
-    if (!(length > 0)) continue;
-    const Eigen::Vector3d along = (end - begin) / length;
-    if (const auto hit = first_hit(geometry, begin, along, length)) {
-      landing.hit = *hit;
-      landing.point = begin + hit->distance * along;
-      const Eigen::Vector3d normal = medium.field.to_world().linear().transpose() * hit->normal;
-      landing.normal = {float(normal[0]), float(normal[1]), float(normal[2])};
-      landing.to_plane = static_cast<float>(hit->normal.dot(landing.point - first));
-      // A step that lands at its beginning is not none.
-      landing.part = std::max(1e-30f, static_cast<float>((i - 1 + hit->distance / length) / count));
-      if (leaves && !medium.field.contains(landing.point)) landing.part = 0;  // Behind the face of the extent.
-      return landing.part > 0;
-    }
-    begin = end;
-  }
-  return false;
+  const Eigen::Vector3d start = medium.field.to_world() * (step.origin + step.from);
+  for_chords(medium, step, count, [&](int i, const Segment& chord) {
+    const double length = (chord.to - chord.from).norm();
+    if (!(length > 0)) return false;
+    const Eigen::Vector3d along = (chord.to - chord.from) / length;
+    const auto hit = first_hit(*medium.settings.geometry, chord.from, along, length);
+    if (!hit) return false;
+    landing.hit = *hit;
+    landing.point = chord.from + hit->distance * along;
+    const Eigen::Vector3d normal = medium.field.to_world().linear().transpose() * hit->normal;
+    landing.normal = {float(normal[0]), float(normal[1]), float(normal[2])};
+    landing.to_plane = static_cast<float>(hit->normal.dot(landing.point - start));
+    // A step that lands at its beginning is not none.
+    landing.part = std::max(1e-30f, static_cast<float>((i + hit->distance / length) / count));
+    if (leaves && !medium.field.contains(landing.point)) landing.part = 0;  // Behind the face of the extent.
+    return true;
+  });
+  return landing.part > 0;
 }
 
 void add_inner_points(const PacketMedium& medium, const Packet& packet, int lane, std::vector<StepPoint>& points) {

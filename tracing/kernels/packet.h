@@ -121,6 +121,9 @@ struct StrongKick {
 /// @param T  T − T₂₂ I, column by column. @param factor  σ h.
 StrongKick strong_kick(const float T[9], float factor, const float v[3]);
 
+/// Those of some lanes whose steps may meet a surface, as bits: all that do, and few others.
+std::uint32_t near_surfaces(const PacketMedium& medium, const Packet& packet, std::uint32_t which);
+
 /// Whether the step of a lane, from `now` to `next`, meets a surface before it leaves the extent; sets `landing`.
 /// @param leaves  Whether `next` is outside the extent.
 bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane, bool leaves,

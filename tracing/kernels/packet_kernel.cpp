@@ -152,13 +152,13 @@ class Kernel {
       stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // The ray has no direction.
     }
     if (!packet.near_surface && !medium_.bounded) return stop;
-    for_lanes(tested & ~stop, [&](int lane) {
+    const std::uint32_t near = packet.near_surface ? near_surfaces(medium_, packet, tested & ~stop) : 0;
+    for_lanes(medium_.bounded ? tested & ~stop : near, [&](int lane) {
       const std::int32_t ray = packet.ray[lane];
       const float before = static_cast<float>(rays_[ray].length);  // Length of the path up to the field.
       if (packet.length[lane] + packet.time[lane] + before >= medium_.settings.max_length)
         stop |= 1u << lane;
-      else if (packet.near_surface &&
-               step_meets_surface(medium_, packet, lane, leave >> lane & 1, batch_.landings[ray]))
+      else if (near >> lane & 1 && step_meets_surface(medium_, packet, lane, leave >> lane & 1, batch_.landings[ray]))
         packet.lands |= 1u << lane;
     });
     return stop;

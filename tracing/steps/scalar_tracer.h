@@ -74,8 +74,9 @@ class Tracer {
     if (direction().isZero() || !position().allFinite()) return RayEnd::degenerate;
     if (!field_.contains(position()))
       if (const auto end = reach_box()) return end;
-    if (geometry_.inside_cut(position(), direction())) return std::nullopt;
-    const auto end = cross_box();
+    const CutAhead ahead = geometry_.cut_ahead(position(), direction());
+    if (ahead.is_inside) return std::nullopt;
+    const auto end = cross_box(ahead.entry);
     if (!end) ++steps_;
     return end;
   }
@@ -108,15 +109,15 @@ class Tracer {
   /// @param way  Its length since it entered the cut.
   std::optional<RayEnd> leave_cut(double way) {
     ++steps_;
-    Hit ahead;
-    ahead.distance = std::ldexp(geometry_.margin() * (1 + steps_ / 8.0), grazes_);
-    const bool grazes = way <= ahead.distance;
-    if (grazes) {
+    Hit onwards;
+    onwards.distance = std::ldexp(geometry_.margin() * (1 + steps_ / 8.0), grazes_);
+    if (way <= onwards.distance) {
       ++grazes_;
-      if (const auto end = reach(ahead)) return end;
+      if (const auto end = reach(onwards)) return end;
     }
-    const bool is_inside = grazes && field_.contains(position()) && geometry_.inside_cut(position(), direction());
-    const auto end = is_inside ? std::nullopt : cross_box();
+    const CutAhead ahead = geometry_.cut_ahead(position(), direction());
+    const bool is_inside = ahead.is_inside && field_.contains(position());
+    const auto end = is_inside ? std::nullopt : cross_box(ahead.entry);
     if (!end) ++steps_;
     return end;
   }
@@ -225,12 +226,12 @@ class Tracer {
     return std::nullopt;
   }
 
-  /// Moves the ray, which is within the box and outside the cut, straight to the cut, to an absorber, or out of the
-  /// box. Returns nothing if it enters the cut.
-  std::optional<RayEnd> cross_box() {
+  /// Moves the ray, which is within the box and outside the cut, straight to its entry into the cut, to an absorber, or
+  /// out of the box. Returns nothing if it enters the cut.
+  std::optional<RayEnd> cross_box(const std::optional<Hit>& entry) {
+    if (!entry) return leave();
     const auto exit = geometry_.crossing(Surface::bounds, false, position(), direction());
-    const auto entry = geometry_.crossing(Surface::cut, true, position(), direction(), exit ? exit->distance : 0);
-    return entry ? reach(entry) : leave();
+    return entry->distance <= (exit ? exit->distance : 0) ? reach(entry) : leave();
   }
 
   /// The length of an automatic step, in voxels.

@@ -137,8 +137,57 @@ TEST(Geometry, KnowsWhatIsInsideTheCut) {
     const double depth = 1 - (turned.inverse() * point).cwiseAbs().maxCoeff();
     if (std::abs(depth) < 1e-4) continue;  // Rounding decides.
     EXPECT_EQ(geometry.inside_cut(point), depth > 0);
+    const Vector3d along(0.6, 0, 0.8);
+    const CutAhead ahead = geometry.cut_ahead(point, along);
+    EXPECT_EQ(ahead.is_inside, depth > 0);
+    const auto entry = geometry.crossing(Surface::cut, true, point, along);
+    EXPECT_EQ(ahead.entry.has_value(), entry.has_value());
+    if (entry && ahead.entry) {
+      EXPECT_NEAR(ahead.entry->distance, entry->distance, 1e-12);
+    }
   }
   EXPECT_TRUE(Geometry(box_surfaces()).inside_cut({9, 9, 9}));
+}
+
+/// Alone or together, near each other or not: none that leaves the cut or meets an obstacle is missed, also at vertices
+/// and edges, and few others are found.
+TEST(Geometry, NoneOfManyWaysIsMissed) {
+  Surfaces surfaces = box_surfaces();
+  Eigen::Affine3d turned = Eigen::Affine3d::Identity();
+  turned.linear() = 0.5 * Eigen::AngleAxisd(0.5, Vector3d(1, 1, 0).normalized()).toRotationMatrix();
+  surfaces.cut = box_mesh(unit_box(), turned);
+  surfaces.obstacles = {box_mesh({Vector3d(-0.2, -0.1, 0.1), Vector3d(0.3, 0.2, 0.25)}, turned)};
+  const TriangleMesh cut = *surfaces.cut;
+  const Geometry geometry(std::move(surfaces));
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto anywhere = [&] { return Vector3d(uniform(random), uniform(random), uniform(random)); };
+  int meet = 0, others = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Vector3d common = 0.6 * anywhere();
+    Segment ways[16];
+    for (int k = 0; k < 16; ++k) {
+      const auto& triangle = cut.triangles[random() % cut.triangles.size()];
+      const double part = k % 2 ? 0 : (uniform(random) + 1) / 2;
+      const Vector3d edge = cut.vertices[triangle[0]] + part * (cut.vertices[triangle[1]] - cut.vertices[triangle[0]]);
+      const Vector3d through = i % 4 == 0 ? Vector3d(edge + 1e-7 * anywhere()) : Vector3d(common + 0.05 * anywhere());
+      const Vector3d along = i % 2 ? anywhere() : Vector3d(Vector3d(0.1, 0.2, 1) + 0.01 * anywhere());
+      ways[k] = {through - 0.1 * along, through + 0.1 * uniform(random) * along};
+    }
+    const std::uint32_t all = geometry.may_meet(ways, 16);
+    for (int k = 0; k < 16; ++k) {
+      const double length = (ways[k].to - ways[k].from).norm();
+      const Vector3d along = (ways[k].to - ways[k].from) / length;
+      const bool meets = geometry.crossing(Surface::cut, false, ways[k].from, along, length) ||
+                         geometry.absorber(ways[k].from, along, length);
+      const bool found = (geometry.may_meet(&ways[k], 1) & all >> k & 1) != 0;
+      EXPECT_TRUE(found || !meets) << i << " " << k;
+      meet += meets;
+      others += found && !meets;
+    }
+  }
+  EXPECT_GT(meet, 3000);
+  EXPECT_LT(others, meet / 2);
 }
 
 TEST(Plate, PixelsAndWorldAreInverse) {
