@@ -75,6 +75,9 @@ TensorField waves_field(const Lattice& lattice, int levels = 3) {
   return cubic_field(waves_grid(usual_box(), lattice, levels));
 }
 
+/// Cubes, and oblong voxels that are turned and mirrored.
+std::vector<Lattice> two_lattices() { return {lattices().front(), lattices().back()}; }
+
 /// Light along axes, diagonals and faces of bricks of all levels, exactly and nearly; and at random.
 RayBatch rays_of_all_kinds(const TensorField& field, const std::vector<double>& flexibilities) {
   RayBatch rays;
@@ -94,7 +97,7 @@ using RaysThroughLevels = EveryInstructionSet;
 INSTANTIATE_TEST_SUITE_P(All, RaysThroughLevels, test::instruction_sets(), instruction_set_name);
 
 TEST_P(RaysThroughLevels, PacketsAreTheReference) {
-  for (const Lattice& lattice : tested_lattices()) {
+  for (const Lattice& lattice : two_lattices()) {
     const TensorField field = waves_field(lattice);
     ASSERT_EQ(field.levels(), 3);
     const auto expect = [&](double step, double kick, double length) {
@@ -110,9 +113,9 @@ TEST_P(RaysThroughLevels, PacketsAreTheReference) {
 }
 
 TEST_P(RaysThroughLevels, OneVoxelAlongAnAxisAndExtentsOfAnySize) {
-  for (const Lattice& lattice : tested_lattices())
-    for (const AlignedBox3i& box : {index_box({7, -1, 0}, {1, 30, 20}), index_box({0, 3, 8}, {30, 1, 1}), odd_box(),
-                                    index_box({-5, -3, -1}, {12, 11, 7})}) {
+  for (const Lattice& lattice : two_lattices())
+    for (const AlignedBox3i& box :
+         {index_box({7, -1, 0}, {1, 30, 20}), index_box({0, 3, 8}, {30, 1, 1}), index_box({-5, -3, -1}, {28, 11, 7})}) {
       TensorGrid grid = waves_grid(box, lattice, 1);
       refine(grid, in_l, [&](const Vector3d& p) { return waves(p, 1); });
       TensorField field = cubic_field(grid);
@@ -122,7 +125,7 @@ TEST_P(RaysThroughLevels, OneVoxelAlongAnAxisAndExtentsOfAnySize) {
 }
 
 TEST_P(RaysThroughLevels, SurfacesAndCutsWithinFineBricks) {
-  for (const Lattice& lattice : tested_lattices())
+  for (const Lattice& lattice : two_lattices())
     for (const bool with_cut : {false, true}) {
       Surfaces surfaces;
       if (with_cut) surfaces.cut = box_mesh({Vector3d(2.3, 3.1, 1.7), Vector3d(30.2, 22.9, 29)}, lattice.to_world);
@@ -165,8 +168,7 @@ TEST_P(RaysThroughLevels, DifferentialsAreThoseOfTheReference) {
 
 /// Light reaches no end in fields that cannot be followed, but it stops.
 TEST_P(RaysThroughLevels, NothingHangs) {
-  const double bad[] = {std::nan(""), std::numeric_limits<double>::infinity(), 1e30};
-  for (const double value : bad) {
+  for (const double value : {std::nan(""), std::numeric_limits<double>::infinity(), 1e30}) {
     TensorGrid grid = waves_grid(usual_box(), lattices()[0], 2);
     grid.finer[0][20].values[100](1, 2) = static_cast<float>(value);
     TensorField field = cubic_field(grid);
