@@ -55,9 +55,10 @@ bool near_corner(const Vector3d& p) { return in_l(p) && (p.array() < 20).all(); 
 
 /// Waves of 24 to 64 voxels, and in finer levels of half and of a quarter of these lengths, too.
 Matrix3d waves(const Vector3d& p, int level) {
-  Matrix3d T = smooth_tensor(41)(p);
-  if (level > 0) T += 0.3 * smooth_tensor(42)(2 * p);
-  if (level > 1) T += 0.2 * smooth_tensor(43)(4 * p);
+  static const TensorFunction smooth[] = {smooth_tensor(41), smooth_tensor(42), smooth_tensor(43)};
+  Matrix3d T = smooth[0](p);
+  if (level > 0) T += 0.3 * smooth[1](2 * p);
+  if (level > 1) T += 0.2 * smooth[2](4 * p);
   return T / mean_edge;
 }
 
@@ -70,12 +71,8 @@ TensorGrid waves_grid(const AlignedBox3i& box, const Lattice& lattice, int level
 }
 
 AlignedBox3i usual_box() { return index_box({0, 0, 0}, {33, 33, 33}); }
+TensorField waves_field(const Lattice& lattice) { return cubic_field(waves_grid(usual_box(), lattice, 3)); }
 
-TensorField waves_field(const Lattice& lattice, int levels = 3) {
-  return cubic_field(waves_grid(usual_box(), lattice, levels));
-}
-
-/// Cubes, and oblong voxels that are turned and mirrored.
 std::vector<Lattice> two_lattices() { return {lattices().front(), lattices().back()}; }
 
 /// Light along axes, diagonals and faces of bricks of all levels, exactly and nearly; and at random.
@@ -116,9 +113,7 @@ TEST_P(RaysThroughLevels, OneVoxelAlongAnAxisAndExtentsOfAnySize) {
   for (const Lattice& lattice : two_lattices())
     for (const AlignedBox3i& box :
          {index_box({7, -1, 0}, {1, 30, 20}), index_box({0, 3, 8}, {30, 1, 1}), index_box({-5, -3, -1}, {28, 11, 7})}) {
-      TensorGrid grid = waves_grid(box, lattice, 1);
-      refine(grid, in_l, [&](const Vector3d& p) { return waves(p, 1); });
-      TensorField field = cubic_field(grid);
+      TensorField field = cubic_field(waves_grid(box, lattice, 2));
       RayBatch rays = random_rays(field, 24, {0.02, 0.05}, 47);
       expect_as_exact_as_reference(make_scene(lattice.name, std::move(field), {}, 0, std::move(rays)));
     }
@@ -169,7 +164,7 @@ TEST_P(RaysThroughLevels, DifferentialsAreThoseOfTheReference) {
 /// Light reaches no end in fields that cannot be followed, but it stops.
 TEST_P(RaysThroughLevels, NothingHangs) {
   for (const double value : {std::nan(""), std::numeric_limits<double>::infinity(), 1e30}) {
-    TensorGrid grid = waves_grid(usual_box(), lattices()[0], 2);
+    TensorGrid grid = waves_grid(usual_box(), lattices()[0], 3);
     grid.finer[0][20].values[100](1, 2) = static_cast<float>(value);
     TensorField field = cubic_field(grid);
     RayBatch rays = rays_of_all_kinds(field, {0.05, 1e30, std::nan("")});
@@ -181,8 +176,6 @@ TEST_P(RaysThroughLevels, NothingHangs) {
     for (const std::uint32_t steps : ends.steps) EXPECT_LE(steps, 1001u);
   }
 }
-
-// Levels that add nothing.
 
 /// Level 0 alone, and refined with its own values.
 struct Redundant {
@@ -275,8 +268,6 @@ TEST(LevelsThatAddNothing, PathsHaveTheSameTensors) {
       EXPECT_LT((a.change - b.change).norm(), 1e-4 * 0.02 * greatest);
     }
 }
-
-// Levels that follow a formula.
 
 /// Smooth, with a bump where the field is refined.
 Matrix3d bump(const Vector3d& p) {
