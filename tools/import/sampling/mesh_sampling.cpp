@@ -126,14 +126,15 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
   const std::vector<float> sizes = cell_sizes(coarsest);
   SamplingLattice lattice = coarsest.lattice;
   BlockPlaces places(lattice.size);
+  std::vector<VoxelSet> wanted;  // Of the level; empty: all.
   std::size_t bricks = 0;
   for (int level = 1; level < settings.levels.value_or(max_levels); ++level) {
     if (lattice.size.maxCoeff() > largest || settings.finest.value_or(0) > 0.5 * rounded_one * lattice.voxel.minCoeff())
       return;
     const MeshSource source = on_lattice(coarsest, lattice);
     const TensorBlocks& blocks = level == 1 ? grid.blocks : grid.finer.back();
-    const double tolerance = error * report.native_peak * std::pow(2, level - 1);
-    const auto missed = missed_cells({source, places, blocks}, sizes, tolerance);
+    const double tolerance = error > 0 ? error * report.native_peak * std::pow(2, level - 1) : -1;
+    const auto missed = missed_cells({source, places, blocks, wanted}, sizes, tolerance);
     const std::vector<bool> refined = bricks_to_refine(lattice, places, missed);
     const auto count = static_cast<std::size_t>(std::count(refined.begin(), refined.end(), true));
     if (count == 0) return;
@@ -144,8 +145,8 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
     places = BlockPlaces(half.size, places, refined);
     lattice = half;
     std::size_t overlaid = 0;
-    TensorBlocks filled =
-        mesh_blocks(on_lattice(coarsest, lattice), places, voxels_about(lattice, places, missed), progress, overlaid);
+    wanted = voxels_about(lattice, places, missed);
+    TensorBlocks filled = mesh_blocks(on_lattice(coarsest, lattice), places, wanted, progress, overlaid);
     remove_empty_blocks(filled);
     if (filled.empty()) return;
     grid.finer.push_back(std::move(filled));

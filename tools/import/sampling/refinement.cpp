@@ -13,8 +13,6 @@
 #include <vtkIdList.h>
 #include <vtkNew.h>
 
-#include "tools/import/meshes/mesh_cell.h"
-
 namespace tensorray {
 namespace {
 
@@ -60,8 +58,8 @@ class LevelVoxels {
     }
   }
 
-  /// The distance of what the voxels give at `x` from `value`; 0 where voxels of the level end that of the level before
-  /// follows.
+  /// The distance of what the voxels give at `x` from `value`; 0 where the voxels of the level end, as the level
+  /// before is good enough there.
   double error(const Vector3d& x, const Value& value) const {
     const SamplingLattice& lattice = level_.source.lattice;
     const Vector3d at = (x - lattice.origin).cwiseQuotient(lattice.voxel);
@@ -76,6 +74,7 @@ class LevelVoxels {
       const std::optional<std::size_t> place = level_.places.number(index.x() / 8, index.y() / 8, index.z() / 8);
       if (!place) return 0;
       const auto offset = static_cast<std::size_t>(TensorBlock::offset(index.x() % 8, index.y() % 8, index.z() % 8));
+      if (!level_.wanted.empty() && !level_.wanted[*place][offset]) return 0;
       const TensorBlock* const block = block_[*place];
       if (block && block->active[offset]) values[static_cast<std::size_t>(i)] = block->values[offset].data();
       is_whole = is_whole && values[static_cast<std::size_t>(i)];
@@ -140,7 +139,7 @@ std::vector<char> find_misses(const SampledLevel& level, const std::vector<float
         x = source.solid.boxes[i].center();
       const Eigen::Map<const Value> value(tensors + 9 * id);
       if (!box.contains(x) || !value.allFinite()) continue;
-      misses[i] = tolerance == 0 || voxels.error(x, value) > tolerance;
+      misses[i] = tolerance < 0 || voxels.error(x, value) > tolerance;
     }
   });
   return misses;

@@ -18,13 +18,14 @@ struct SampledLevel {
   const MeshSource& source;  ///< With its lattice.
   const BlockPlaces& places;
   const TensorBlocks& blocks;
+  const std::vector<VoxelSet>& wanted;  ///< As mesh_blocks had it.
 };
 
 /// The boxes of the cells that a level misses: one of their points (or they, if tensors are at cells alone) is where
 /// cells are smaller than voxels by more than rounding to a power of two, and where the voxels give a tensor that
-/// differs from the mesh's by more than `tolerance` (Frobenius). Between voxels that is cubic interpolation; where some
-/// of its 4³ voxels are not active, a linear function fitted to the others, so that linear fields need no finer voxels
-/// up to a body's surface. Uses all threads; the result does not depend on their number.
+/// differs from the mesh's by more than `tolerance` (Frobenius; < 0: by anything). Between voxels that is cubic
+/// interpolation; where some of its 4³ voxels are not active, a linear function fitted to the others, so that linear
+/// fields need no finer voxels up to a body's surface. Uses all threads; the result does not depend on their number.
 std::vector<Eigen::AlignedBox3d> missed_cells(const SampledLevel& level, const std::vector<float>& sizes,
                                               double tolerance);
 
