@@ -321,6 +321,7 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
   Geometry geometry(load_surfaces(description, loaded.field, beam));
   note_pixels(description.receiver, *geometry.surfaces().plate, notes);
   Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(light.color));
+  scene.kept = std::move(loaded.kept);
   scene.eigenvalues = loaded.eigenvalues;
   scene.non_finite = loaded.non_finite;
   scene.beam = std::move(beam);
@@ -404,8 +405,12 @@ std::string field_key(const SceneDescription& description) {
     field.erase("bounds");
   }
   const FieldChoices choices = choices_of(description);
-  return nlohmann::json{field, identity_of(description.field.file), choices.interpolant.between,
-                        choices.interpolant.border, choices.keeps_surface}
+  return nlohmann::json{field,
+                        identity_of(description.field.file),
+                        choices.interpolant.between,
+                        choices.interpolant.border,
+                        choices.keeps_surface,
+                        choices.eigenvalues}
       .dump();
 }
 
@@ -413,6 +418,7 @@ std::optional<LoadedField> field_of(const std::optional<Scene>& before, const Sc
   if (!before || before->field_key != field_key(description)) return {};
   LoadedField field{before->field, before->eigenvalues, before->non_finite, {}};
   field.is_known = true;
+  field.kept = before->kept;
   return field;
 }
 
