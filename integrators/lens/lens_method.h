@@ -82,7 +82,7 @@ inline void describe(LensDescription& lens, KeyVisitor& visit) {
   visit("image_layer", lens.image_layer, "lens: layer of the file (.exr); default: R, G, B, or the first layer");
   visit.section("image_plane", lens.plane, "lens: position and size of the image");
   visit("wrap", lens.wrap, "lens: how the image continues beyond its edges (gather)");
-  visit("samples", lens.samples, "lens: samples of a pixel along x and along y", between(1, 16));
+  visit("samples", lens.samples, "lens, polariscope: samples of a pixel along x and along y", between(1, 16));
   visit("overlay", lens.overlay, "lens: grid draws straight and distorted grid lines over the picture", knob());
   visit("obstacles", lens.obstacles, "lens: shaded draws the obstacles where no light of the image arrives");
 }

@@ -5,6 +5,7 @@
 #include "integrators/methods/read_scene.h"
 #include "integrators/path_tracing/path_tracing_method.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
+#include "integrators/polariscope/polariscope_method.h"
 #include "integrators/scene/scene_method.h"
 #include "integrators/stretch/stretch_method.h"
 
@@ -12,7 +13,8 @@ namespace tensorray {
 namespace {
 
 std::vector<std::shared_ptr<Method>> all_methods() {
-  return {photon_distribution_method(), lens_method(), path_tracing_method(), stretch_method(), scene_method()};
+  return {photon_distribution_method(), lens_method(), path_tracing_method(), stretch_method(), scene_method(),
+          polariscope_method()};
 }
 
 }  // namespace

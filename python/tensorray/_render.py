@@ -114,7 +114,18 @@ class Render:
         """Spectral irradiance, unit of the light's irradiance per nm: float32, shape (height, width, bands). Needs
         keep=["spectral"]; else None."""
         spectral = self._rendered.spectral()
-        return None if spectral is None else spectral[0][:, :, 3:]
+        return None if spectral is None else spectral[0][:, :, -len(self.wavelengths):]
+
+    @property
+    def stokes(self) -> NDArray[np.float32] | None:
+        """Stokes' parameters S0 to S3 of polariscope, shape (height, width, bands, 4), if the scene has `output.stokes`
+        and the render keep=["spectral"]; else None."""
+        spectral = self._rendered.spectral()
+        bands = 0 if spectral is None else len(self.wavelengths)
+        if spectral is None or len(spectral[1]) < 3 + 4 * bands:
+            return None
+        parts = [spectral[0][:, :, 3 + i * bands:3 + (i + 1) * bands] for i in (3, 0, 1, 2)]  # S0 is the last one.
+        return np.stack(parts, axis=-1)
 
     @functools.cached_property
     def wavelengths(self) -> NDArray[np.float64] | None:
@@ -122,7 +133,8 @@ class Render:
         spectral = self._rendered.spectral()
         if spectral is None:
             return None
-        return np.array([float(name.split(".", 1)[1][:-2].replace(",", ".")) for name in spectral[1][3:]])
+        names = [name for name in spectral[1] if name.startswith("S0.")]
+        return np.array([float(name.split(".", 1)[1][:-2].replace(",", ".")) for name in names])
 
     @functools.cached_property
     def photons(self) -> NDArray[Any]:

@@ -140,7 +140,8 @@ bool parse_number(const std::string& word, double& number) {
 }
 
 /// @throw std::runtime_error; the message begins with `where`.
-void append_sample(Spectrum& spectrum, const std::vector<std::string>& columns, const std::string& where) {
+void append_sample(Spectrum& spectrum, const std::vector<std::string>& columns, bool any_sign,
+                   const std::string& where) {
   double wavelength = 0, value = 0;
   if (columns.size() != 2)
     throw std::runtime_error(where + "expected two columns, wavelength (nm) and value, found " +
@@ -149,7 +150,8 @@ void append_sample(Spectrum& spectrum, const std::vector<std::string>& columns, 
     throw std::runtime_error(where + "expected two numbers, wavelength (nm) and value");
   if (!std::isfinite(wavelength) || wavelength <= 0)
     throw std::runtime_error(where + "the wavelength must be above 0 nm");
-  if (!std::isfinite(value) || value < 0) throw std::runtime_error(where + "the value must be finite and not negative");
+  if (!std::isfinite(value) || (value < 0 && !any_sign))
+    throw std::runtime_error(where + "the value must be finite" + (any_sign ? "" : " and not negative"));
   if (!spectrum.wavelengths.empty() && wavelength <= spectrum.wavelengths.back())
     throw std::runtime_error(where + "wavelengths must increase; sort the lines, and give each wavelength once");
   spectrum.wavelengths.push_back(wavelength);
@@ -186,7 +188,7 @@ Spectrum blackbody(double kelvin) {
   return tabulate([&](double wavelength) { return planck(wavelength, second_radiation_constant / kelvin); });
 }
 
-Spectrum read_spectrum(const std::filesystem::path& path) {
+Spectrum read_spectrum(const std::filesystem::path& path, bool any_sign) {
   require_readable(path);
   std::ifstream file(path);
   Spectrum spectrum;
@@ -199,7 +201,7 @@ Spectrum read_spectrum(const std::filesystem::path& path) {
     double first = 0;
     const bool heading = heading_allowed && !parse_number(columns.front(), first);
     heading_allowed = false;
-    if (!heading) append_sample(spectrum, columns, path.string() + ", line " + std::to_string(number) + ": ");
+    if (!heading) append_sample(spectrum, columns, any_sign, path.string() + ", line " + std::to_string(number) + ": ");
   }
   if (spectrum.wavelengths.empty())
     throw std::runtime_error(path.string() + ": no samples; a spectrum is lines of wavelength (nm) and value");

@@ -218,6 +218,7 @@ struct OutputDescription {
   std::vector<Output> kinds;                           ///< All kinds of output that any method can write.
   std::map<std::string, std::filesystem::path> files;  ///< Files to write, by Output::key.
   bool fluence_bands = false;                          ///< Whether `fluence` also has a grid for each band.
+  bool stokes = false;                                 ///< Whether `spectral` has Stokes' parameters.
   std::optional<double> exposure;                      ///< Exposure of `image` in stops; none: "auto".
   bool white_balance = true;  ///< Whether the white of the light is adapted to that of the working space.
   std::string ocio;           ///< OCIO config, as of ColorSettings; empty: $OCIO, or the built-in one.

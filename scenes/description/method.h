@@ -34,6 +34,13 @@ struct Output {
   const char* option_ending = nullptr;
 };
 
+/// The key that says how strongly a picture shows the field, and the value that counts.
+struct Strength {
+  const char* section;
+  const char* key;
+  double value;
+};
+
 /// A method that has loaded everything that it needs for a scene. Immutable: any number of threads may render with it.
 class LoadedMethod {
  public:
@@ -42,6 +49,9 @@ class LoadedMethod {
   /// @param job  Keeps the units of the work, and divides them; null: neither.
   /// @throw Cancelled; std::runtime_error; SceneError if a value of the scene does not fit the data.
   virtual Render render(const Scene& scene, const Progress& progress, RenderJob* job) const = 0;
+
+  /// `field.scale`, unless it is another key.
+  virtual Strength strength(const Scene& scene) const;
 };
 
 /// The settings of a method, as the scene file gives them. The settings of all methods are read from every scene file,
@@ -70,6 +80,9 @@ class Method {
 
   /// The view of a display that suits its pictures, if the scene names none (ColorSettings::preferred_view).
   virtual std::string preferred_view() const { return {}; }
+
+  /// Whether the field bends its light: it has a scale then, and a direction in which it shows most.
+  virtual bool bends_light() const { return true; }
 
   /// The files that the method reads, as its keys name them.
   virtual std::vector<NamedFile> inputs() const { return {}; }

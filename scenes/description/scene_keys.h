@@ -196,6 +196,8 @@ inline void describe(OutputDescription& output, KeyVisitor& visit) {
     if (!file.empty()) output.files[kind.key] = file;
   }
   visit("fluence_bands", output.fluence_bands, "write a further grid to `fluence` for each band of wavelengths");
+  visit("stokes", output.stokes,
+        "polariscope: `spectral` has the four Stokes parameters of the light on the last polariser");
   visit("exposure", output.exposure, "exposure of `image`, stops", between(-100, 100).or_word("auto").as_knob(-8, 8));
   visit("white_balance", output.white_balance, "adapt the light's white to the working space's");
   visit("ocio", output.ocio,

@@ -254,6 +254,7 @@ std::string advice_on(const AutoScale& given, const AutoScale& best) {
 AutoScale load_scale(const SceneDescription& description, const TensorField& field, const Geometry& geometry,
                      const Beam& beam, double flexibility, const Progress& progress, std::vector<std::string>& notes) {
   const std::optional<double>& given = description.field.scale;
+  if (!description.integrator.method().bends_light()) return AutoScale{given.value_or(1)};
   const Geometry volume({geometry.surfaces().bounds, geometry.surfaces().cut, std::nullopt, {}});
   const Beam light = silhouette_beam(field.corners(), beam.direction, beam.up);
   const AutoScale scale = given ? judge_scale(field, volume, light, *given, flexibility, progress)
@@ -281,6 +282,13 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
 Eigen::Vector3d load_direction(const SceneDescription& description, const TensorField& field, const Progress& progress,
                                std::vector<std::string>& notes) {
   if (description.light.direction) return *description.light.direction;
+  if (!description.integrator.method().bends_light()) {
+    int shortest = 2;
+    field.world_box().sizes().minCoeff(&shortest);
+    const Eigen::Vector3d V = -Eigen::Vector3d::Unit(shortest) + Eigen::Vector3d::Zero();
+    notes.push_back(fmt::format("light: along [{:g}, {:g}, {:g}], where the field is thinnest", V.x(), V.y(), V.z()));
+    return V;
+  }
   const AutoDirection chosen = choose_direction(field, Geometry(load_volume(description, field)),
                                                 description.light.up.value_or(Eigen::Vector3d::UnitZ()), progress);
   const Eigen::Vector3d V = chosen.direction + Eigen::Vector3d::Zero();  // 0, not -0.
@@ -365,6 +373,7 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
   note_pixels(description.receiver, *geometry.surfaces().plate, notes);
   if (description.receiver.center) note_place(*geometry.surfaces().plate, beam, loaded.field, notes);
   Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(light.color));
+  scene.kept = std::move(loaded.kept);
   scene.eigenvalues = loaded.eigenvalues;
   scene.non_finite = loaded.non_finite;
   scene.beam = std::move(beam);
@@ -449,8 +458,12 @@ std::string field_key(const SceneDescription& description) {
     field.erase("bounds");
   }
   const FieldChoices choices = choices_of(description);
-  return nlohmann::json{field, identity_of(description.field.file), choices.interpolant.between,
-                        choices.interpolant.border, choices.keeps_surface}
+  return nlohmann::json{field,
+                        identity_of(description.field.file),
+                        choices.interpolant.between,
+                        choices.interpolant.border,
+                        choices.keeps_surface,
+                        choices.eigenvalues}
       .dump();
 }
 
@@ -458,6 +471,7 @@ std::optional<LoadedField> field_of(const std::optional<Scene>& before, const Sc
   if (!before || before->field_key != field_key(description)) return {};
   LoadedField field{before->field, before->eigenvalues, before->non_finite, {}};
   field.is_known = true;
+  field.kept = before->kept;
   return field;
 }
 

@@ -39,6 +39,8 @@ void warn_of_annotations(const Scene& scene, Render& render) {
 
 }  // namespace
 
+Strength LoadedMethod::strength(const Scene& scene) const { return {"field", "scale", scene.scale.scale}; }
+
 bool nothing_arrived(const Statistics& statistics) {
   return std::all_of(statistics.ends.begin(), statistics.ends.end(),
                      [](const EndCounts& counts) { return counts[static_cast<int>(RayEnd::plate)] == 0; });

@@ -75,7 +75,11 @@ struct Render {
   /// Draws a legend over a scene-linear picture whose exposure is so many stops; empty: no legend.
   std::function<void(Image&, double exposure)> draw_legend;
   Statistics statistics;
+  std::vector<std::string> notes;     ///< What the picture shows, for the user; one line each.
   std::vector<std::string> warnings;  ///< Problems that the picture does not show by itself; one line each.
+
+  /// Values of a pixel of `linear` that its channels do not show as they are, with their names; may be empty.
+  std::function<std::vector<std::pair<std::string, std::string>>(const float* pixel)> describe_pixel;
 };
 
 /// Adds the steps and samples of the other ranks, at the root. @throw as Ranks::gather.

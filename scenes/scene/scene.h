@@ -22,6 +22,7 @@
 
 namespace tensorray {
 
+class KeptResults;
 class RayMemory;
 
 struct Scene {
@@ -45,6 +46,8 @@ struct Scene {
   /// Rays of the scene's light on the plate, kept from the scene before; null: none is kept.
   std::shared_ptr<RayMemory> rays;
 
+  std::shared_ptr<KeptResults> kept;  ///< Of the field; null: nothing is kept.
+
   std::shared_ptr<const LoadedMethod> method;  ///< The method that renders the scene.
 
   EigenvalueReport eigenvalues;
@@ -61,6 +64,7 @@ struct LoadedField {
   std::size_t non_finite = 0;
   std::vector<std::string> notes;
   bool is_known = false;  ///< Notes about it, and warnings about the description, were told with an earlier scene.
+  std::shared_ptr<KeptResults> kept = nullptr;
 };
 
 /// What is made of a field's voxels.
@@ -84,7 +88,7 @@ FieldChoices choices_of(const SceneDescription& description);
 LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const std::string& source);
 
 /// Descriptions of scenes with the same field have the same key: all keys of the field but `scale` and `bounds`, what
-/// is between its voxels, whether it keeps its surface, and what tells whether its file has changed.
+/// is between its voxels, whether it keeps its surface, its eigenvalues, and what tells whether its file has changed.
 std::string field_key(const SceneDescription& description);
 
 /// The field of a scene that was loaded before, if a description has the same; both share the voxels.

@@ -23,6 +23,7 @@ OTHERS = {
     "path_tracing": {"field": FIELD, "camera": {"resolution": [24, 24]},
                      "integrator": {"type": "path_tracing", "max_samples": 4}},
     "stretch": {"field": FIELD, "integrator": {"type": "stretch", "stretch": {"resolution": 16}}},
+    "polariscope": {"field": FIELD, "receiver": {"resolution": [24, 24]}, "integrator": {"type": "polariscope"}},
 }
 
 
@@ -55,6 +56,21 @@ class RendersTest(unittest.TestCase):
         for ending in endings:
             written = [bytes_of(self.folder, name + ending) for name in ("python", "program")]
             self.assertEqual(written[0], written[1], ending)
+
+    def test_a_polariscope_measures_a_stress(self):
+        """A plate 0.01 thick, pulled by 1e6: C σ h = 780 nm. Stokes' parameters of one ray are those of polarised light."""
+        T = np.zeros((1, 5, 5, 3, 3))
+        T[..., 0, 0] = 1e6
+        plate = tr.Field(T, voxel_size=(1, 1, 0.01))
+        scene = {"receiver": {"size": [2, 2], "resolution": 4}, "output": {"stokes": True},
+                 "integrator": {"type": "polariscope", "stress_optic": 78e-12, "samples": 1}}
+        picture = tr.render(scene, field=plate, keep=["spectral"])
+        np.testing.assert_allclose(picture.aovs["integral"], 780, rtol=1e-5)
+        np.testing.assert_allclose(picture.aovs["length"], 0.01, rtol=1e-5)
+        S = picture.stokes
+        self.assertEqual(S.shape, (4, 4, len(picture.wavelengths), 4))
+        np.testing.assert_allclose((S[..., 1:] ** 2).sum(axis=-1), S[..., 0] ** 2, rtol=1e-4)
+        self.assertEqual(picture.spectral.shape, S.shape[:3])
 
     def test_the_bytes_are_those_of_the_command_line(self):
         self.same_files(PHOTONS, [".png", ".exr", ".spectral.exr", ".fluence.vdb", ".vdb"])

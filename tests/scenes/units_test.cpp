@@ -34,6 +34,7 @@ const std::vector<SceneCase> scenes{
     {"lens", R"({"receiver": {"distance": $1, "size": [$3, $3], "resolution": [24, 24]},
                  "integrator": {"type": "lens"}})"},
     {"lens by gathering", R"({"integrator": {"type": "lens", "mode": "gather", "image_plane": {"distance": $0.5}}})"},
+    {"polariscope", R"({"integrator": {"type": "polariscope"}})"},
     {"paths", R"({"integrator": {"type": "path_tracing", "max_samples": 4, "seeds": {"count": 20}}})"},
     // Of lamps' photons, powers in units of area are checked up to here.
     {"whole", R"({"objects": [{"plate": {"center": [0, 0, $-2.6], "size": [$16, $16]}, "texture": "checkerboard"}],

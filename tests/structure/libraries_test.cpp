@@ -99,7 +99,7 @@ TEST(Structure, WhatComputesNeverSeesAScene) {
   const std::regex includes("#include \"scenes/(scene/scene|description/description)\\.h\"");
   const std::regex computes(
       "/(lens|lens_map|lens_shading|lens_view|fluence|photon_chunks|photon_distribution|"
-      "field_region|stretch)\\.(h|cpp)$");
+      "field_region|stretch|elements|differences|turning|polariscope)\\.(h|cpp)$");
   std::size_t found = 0;
   for (const Line& line : lines_of("integrators")) {
     if (!std::regex_search(line.file, computes)) continue;

@@ -81,13 +81,14 @@ const std::vector<Room> rooms{
     {"integrators/photon_distribution", {"scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
     {"integrators/lens", {"scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
     {"integrators/stretch", {"scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
+    {"integrators/polariscope", {"scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
     {"integrators/path_tracing",
      {"integrators/path_files", "integrators/photon_distribution", "integrators/seeds", "scenes/*", "tracing/*",
       "renderer/*", "volumes/*"}},
     {"integrators/scene", {"integrators/path_tracing", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
     {"integrators/methods",
-     {"integrators/photon_distribution", "integrators/lens", "integrators/stretch", "integrators/path_tracing",
-      "integrators/scene", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
+     {"integrators/photon_distribution", "integrators/lens", "integrators/stretch", "integrators/polariscope",
+      "integrators/path_tracing", "integrators/scene", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
 
     {"python/module", {"integrators/*", "scenes/*", "tracing/*", "renderer/*", "volumes/*"}},
 

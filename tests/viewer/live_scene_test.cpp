@@ -83,6 +83,24 @@ TEST_F(LiveSceneTest, RaysThroughTheVolumeAreKept) {
   EXPECT_EQ(samples(live), samples(another));
 }
 
+TEST_F(LiveSceneTest, ThePolariscopeTracesOnceForAllArrangements) {
+  LiveScene live(scene_file());
+  Json scene = test::small_scene();
+  scene["integrator"] = {{"type", "polariscope"}};
+  shown(live, scene);
+  const auto kept = live.scene().kept;
+  for (const double angle : {10.0, 40.0}) {
+    scene["integrator"]["analyzer"] = angle;
+    LiveScene anew(scene_file());
+    EXPECT_EQ(shown(live, scene).pixels, shown(anew, scene).pixels) << angle;
+    EXPECT_EQ(live.scene().kept, kept);
+  }
+  scene["field"]["generate"]["resolution"] = 9;
+  LiveScene anew(scene_file());
+  EXPECT_EQ(shown(live, scene).pixels, shown(anew, scene).pixels);
+  EXPECT_NE(live.scene().kept, kept);
+}
+
 TEST_F(LiveSceneTest, StaysAsItWasWhereASceneIsWrong) {
   LiveScene live(scene_file());
   Json scene = test::small_scene();

@@ -28,7 +28,7 @@
 namespace tensorray {
 namespace {
 
-constexpr std::array<double, 3> factors{0.5, 1, 2};  // Of the scale; one row each.
+constexpr std::array<double, 3> factors{0.5, 1, 2};  // Of the strength; one row each.
 /// Small pictures of photons: quick, however chaotic the light is.
 const std::vector<std::string> quick{"integrator.density={\"kind\":\"gaussian\",\"tau\":1}", "light.photons=20480",
                                      "light.wavelengths.count=16", "light.wavelengths.per_photon=4"};
@@ -119,8 +119,12 @@ std::string pixels_of(const Plate& plate, int size) {
   return fmt::format("receiver.resolution=[{},{}]", pixels.x(), pixels.y());
 }
 
-/// The directions that show most, those that show more first.
+/// The directions that show most, those that show more first. Of light that is not bent, the axes.
 std::vector<Eigen::Vector3d> directions_of(const Scene& scene, const Progress& progress) {
+  if (!scene.description.integrator.method().bends_light()) {
+    const Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+    return {axes.col(0), -axes.col(0), axes.col(1), -axes.col(1), axes.col(2), -axes.col(2)};
+  }
   const Surfaces& all = scene.geometry.surfaces();
   const Geometry volume({all.bounds, all.cut, std::nullopt, {}});
   std::vector<Eigen::Vector3d> directions;
@@ -152,10 +156,10 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
     const Eigen::Vector3d& V = directions[column];
     const std::string direction = fmt::format("light.direction=[{},{},{}]", V.x(), V.y(), V.z());
     load(with(options, {direction}));
-    const double scale = scene->scale.scale;
+    const Strength strength = scene->method->strength(*scene);
     const std::string pixels = pixels_of(*scene->geometry.surfaces().plate, options.size);
     for (std::size_t row = 0; row < factors.size(); ++row) {
-      const std::string scaled = fmt::format("field.scale={}", factors[row] * scale);
+      const std::string scaled = fmt::format("{}.{}={}", strength.section, strength.key, factors[row] * strength.value);
       std::vector<std::string> changes = quick;
       changes.insert(changes.end(),
                      {direction, scaled, pixels, fmt::format("camera.resolution=[{0},{0}]", options.size),
@@ -208,8 +212,9 @@ void explore(ExploreOptions options, Progress& progress) {
                   if (options.pick == number) picked = description.text;
                   if (!options.sheet.empty()) {
                     const Render rendered = render(scene, within);
+                    const Strength strength = scene.method->strength(scene);
                     sheet.draw(column, row, display_image(scene, rendered, false),
-                               fmt::format("{}  {}  scale {:.3g}", number, name, scene.scale.scale));
+                               fmt::format("{}  {}  {} {:.3g}", number, name, strength.key, strength.value));
                   }
                   ++done;
                 });
@@ -235,6 +240,9 @@ void add_explore_command(CLI::App& program, Progress& progress) {
       ->required();
   command->add_option("-o,--output", options->sheet, "The sheet: .png .jpg .tif");
   command->add_option("--set", options->overrides, "KEY=VALUE: change a value of all scenes")->allow_extra_args(false);
+  command->add_option_function<std::string>(
+      "--method", [options](const auto& name) { options->overrides.push_back("integrator.type=" + name); },
+      "The method that makes the pictures, as polariscope");
   command->add_option("--size", options->size, "Of a picture: pixels along its longer side (200)")
       ->check(CLI::Range(16, 2048));
   command->add_option("--pick", options->pick, "Number of the picture whose scene --save-scene writes")

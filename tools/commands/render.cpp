@@ -174,6 +174,9 @@ void add_render_command(CLI::App& program, Progress& progress) {
           "--set", options->changes.overrides,
           "KEY=VALUE: change a value of the scene, as --set light.photons=1e5; files are relative to the scene")
       ->allow_extra_args(false);
+  command->add_option_function<std::string>(
+      "--method", [options](const auto& name) { options->changes.overrides.push_back("integrator.type=" + name); },
+      "The method that makes the picture, as polariscope: instead of the scene's `integrator.type`");
   command->add_option("--threads", options->run.threads, "Number of threads (all)")->check(CLI::Range(1, 4096));
   command->add_option("--seed", options->seed, "Seed of all random numbers (the scene's)");
   command->add_option("--until-error", options->error,

@@ -134,6 +134,7 @@ void complete(const Scene& scene, RenderJob& job, RunFiles files, const RenderRu
   try {
     const Render result = render_or_keep(scene, job, checkpoint, progress);
     bar.reset();  // Erase the bar before the notes are printed.
+    tell(result.notes, run.quiet);
     for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
     write_or_keep(scene, result, checkpoint, std::move(files.outputs), run);
   } catch (const DamagedArchive& error) {

@@ -169,7 +169,8 @@ Json describe_choices(const Scene& scene, const Render& render) {
   for (const Vector3d& corner : scene.field.corners()) far = std::max(far, corner.dot(scene.beam.direction));
   Json receiver = {{"normal", to_json(plate.normal())}, {"size", {plate.size.x(), plate.size.y()}}};
   if (!scene.description.receiver.center) receiver["distance"] = plate.center.dot(scene.beam.direction) - far;
-  return {{"field", {{"scale", scene.scale.scale}}},
+  const Strength strength = scene.method->strength(scene);
+  return {{strength.section, {{strength.key, strength.value}}},
           {"light", {{"direction", to_json(scene.beam.direction)}}},
           {"receiver", std::move(receiver)},
           {"output",
@@ -239,6 +240,8 @@ Json describe_pixel(const Render& render, const Image& display, const Vector2d& 
   const Image& linear = render.linear;
   const float* const pixel = pixel_at(linear, place);
   lines.push_back({"R, G, B", fmt::format("{:.3g}, {:.3g}, {:.3g}", pixel[0], pixel[1], pixel[2])});
+  if (render.describe_pixel)
+    for (const auto& [name, value] : render.describe_pixel(pixel)) lines.push_back({name, value});
   if (render.spectral) {
     const SpectralImage& spectral = *render.spectral;
     const float* const bands = bands_at(spectral, place);

@@ -7,6 +7,7 @@
 
 #include "integrators/methods/read_scene.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/scene/kept_results.h"
 #include "tracing/flow/ray_memory.h"
 
 namespace tensorray {
@@ -160,6 +161,8 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
   // A change that moves all rays begins without a memory: it would cost time and give nothing.
   const Json rays = ray_keys(json, scene);
   if (rays == rays_of_) scene.rays = scene_ && scene_->rays ? scene_->rays : std::make_shared<RayMemory>();
+
+  if (!scene.kept) scene.kept = std::make_shared<KeptResults>();
 
   // From here on nothing fails: the scene before is replaced as a whole.
   if (!has_picture(json, outputs)) render_.reset();

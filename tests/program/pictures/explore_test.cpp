@@ -53,6 +53,24 @@ TEST_F(Explore, ThePicturesAreThoseOfTheirScenes) {
   }
 }
 
+/// Of the polariscope, rows have coefficients of their own: with twice the coefficient, a picture has twice the
+/// fringes.
+TEST_F(Explore, RowsOfThePolariscopeAreItsCoefficients) {
+  const Outcome outcome = explore({"-o", "sheet.png", "--method", "polariscope"});
+  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  const Image sheet = read_image(in_folder("sheet.png"));
+  const int row = (sheet.height - gap) / 3;
+  int different = 0;
+  for (int y = 0; y < 200; ++y)
+    for (int x = 0; x < 200; ++x)
+      different += std::abs(sheet.pixel(gap + x, gap + y)[1] - sheet.pixel(gap + x, gap + y + row)[1]) > 0.1f;
+  EXPECT_GT(different, 4000);
+  ASSERT_EQ(explore({"--method", "polariscope", "--pick", "3", "--save-scene", "cell.json"}).status, 0);
+  const json cell = read_json("cell.json");
+  EXPECT_EQ(cell["integrator"]["type"], "polariscope");
+  EXPECT_GT(cell["integrator"]["stress_optic"].get<double>(), 0);
+}
+
 /// Several depths of a lens are side by side, and the stretch has pixels of its own.
 TEST_F(Explore, PicturesOfOtherMethodsStayInTheirCells) {
   for (const std::vector<std::string>& method : std::vector<std::vector<std::string>>{

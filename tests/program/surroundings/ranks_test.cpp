@@ -91,6 +91,7 @@ TEST_F(RanksProgram, GiveTheFilesOfOneProcess) {
       {plate_scene(gaussian_photons), {"exr", "vtp"}, 2},
       {plate_scene(lens), {"png", "exr", "spectral.exr"}, 2},
       {plate_scene(stretch), {"exr", "vdb"}, 2},
+      {plate_scene(polariscope), {"exr", "spectral.exr"}, 2},
   };
   for (const RankCase& each : cases) {
     SCOPED_TRACE(each.scene);

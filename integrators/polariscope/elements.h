@@ -1,0 +1,74 @@
+#pragma once
+/// @file integrators/polariscope/elements.h
+/// The elements of a polariscope before and after the specimen, and the power that they let through.
+/// Polarisation is in the frame (u, w) across the light, in which the picture is seen: u to the right, w up.
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace tensorray {
+
+enum class ElementKind { polarizer, quarter_wave, retarder };
+
+struct Element {
+  ElementKind kind = ElementKind::polarizer;
+  double angle = 0;        ///< Of the polariser, or of the fast axis; degrees from u towards w.
+  double retardation = 0;  ///< retarder: nm, of any wavelength. A quarter-wave plate is one at every wavelength.
+};
+
+/// Elements in the order of the light.
+struct Arrangement {
+  std::vector<Element> before, after;
+};
+
+/// The number of the last polariser of a list; nothing if it has none.
+std::optional<std::size_t> last_polarizer(const std::vector<Element>& elements);
+
+/// All elements turned by `angle`, and the last polariser by `analyzer` more; degrees.
+Arrangement turned(Arrangement arrangement, double angle, double analyzer);
+
+/// The Jones matrix of elements for light of one wavelength (nm).
+Eigen::Matrix2cd jones_matrix(const std::vector<Element>& elements, double wavelength);
+
+/// What a specimen does to polarisation is a unitary matrix, w I − i (x σ_z + y σ_x + z σ_y). That is the quaternion
+/// (w, x, y, z); products of matrices are products of quaternions, and its rotation turns the vector (S1, S2, −S3) of
+/// Stokes' parameters. S3 > 0 is light that turns clockwise for who faces it.
+///
+/// What an arrangement shows of light of one wavelength, of which R is the mean rotation. Light without polarisation
+/// comes in.
+struct Analysis {
+  double through = 0;                                     ///< What passes, whatever R is, ...
+  Eigen::Matrix3d by_rotation = Eigen::Matrix3d::Zero();  ///< ... and for each component of R.
+  double source = 0;                                      ///< The same of the light on the last polariser: S0, and ...
+  Eigen::Vector3d polarized = Eigen::Vector3d::Zero();    ///< ... its polarised part before the specimen.
+  Eigen::Matrix4d to_stokes = Eigen::Matrix4d::Identity();  ///< From (source, R polarized) to (S0, S1, S2, S3).
+
+  /// Power; 1 is what parallel polarisers let through without a specimen. @param lit  The part of the light that is not
+  /// stopped; R has been multiplied by it.
+  double power(const Eigen::Matrix3d& R, double lit = 1) const {
+    return lit * through + by_rotation.cwiseProduct(R).sum();
+  }
+
+  /// Stokes' parameters without the last polariser, behind which their power would be `power`.
+  Eigen::Vector4d stokes(const Eigen::Matrix3d& R, double lit = 1) const {
+    Eigen::Vector4d in;
+    in << lit * source, R * polarized;
+    return to_stokes * in;
+  }
+};
+
+Analysis analysis_of(const Arrangement& arrangement, double wavelength);
+
+/// A unitary matrix as a rotation, then a linear retarder.
+struct EquivalentRetarder {
+  double phase = 0;     ///< From 0 to π.
+  double azimuth = 0;   ///< Its slow axis: from u towards w, radians; −π/2 to π/2.
+  double rotation = 0;  ///< The same sense; −π/2 to π/2.
+};
+
+EquivalentRetarder equivalent_retarder(const Eigen::Quaterniond& unitary);
+
+}  // namespace tensorray

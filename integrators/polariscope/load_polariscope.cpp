@@ -1,0 +1,142 @@
+#include "integrators/polariscope/load_polariscope.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "base/constants.h"
+#include "scenes/scene/kept_results.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double auto_orders = 4;   // That 99 of 100 rays do not exceed.
+constexpr int probe_pixels = 64;    // Along the longer side of the silhouette.
+constexpr double nanometre = 1e-9;  // m.
+
+/// The bands of the scene. Light of one wavelength has no width.
+std::vector<Band> bands_of(const Scene& scene) {
+  std::vector<Band> bands = scene.bands;
+  if (scene.description.light.wavelength_min == scene.description.light.wavelength_max) bands.front().width = 0;
+  return bands;
+}
+
+/// The coefficients of a file, which must cover the light. @throw std::runtime_error.
+Spectrum read_coefficients(const std::filesystem::path& file, const LightDescription& light, double reference) {
+  Spectrum table = read_spectrum(file, true);
+  const double first = table.wavelengths.front(), last = table.wavelengths.back();
+  if (first > light.wavelength_min || last < light.wavelength_max)
+    throw std::runtime_error(
+        fmt::format("{}: its coefficients, from {:g} to {:g} nm, do not cover the light, from {:g} to {:g} nm; add "
+                    "lines, or narrow `/light/wavelengths`",
+                    file.string(), first, last, light.wavelength_min, light.wavelength_max));
+  if (table.at(reference) == 0)
+    throw std::runtime_error(fmt::format("{}: the coefficient at {:g} nm must not be 0", file.string(), reference));
+  return table;
+}
+
+/// The volume's silhouette behind the volume, as a plate of few pixels.
+Plate silhouette(const Scene& scene, const PolarizedLight& light) {
+  const Beam beam = silhouette_beam(scene.field.corners(), light.direction, light.up);
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : beam.aperture) box.extend(corner);
+  Plate plate;
+  plate.up = beam.up;
+  plate.right = beam.right;
+  plate.center = beam.start(box.center()) + depth_range(scene.field, beam.center, beam.direction).far * beam.direction;
+  plate.size = box.sizes();
+  plate.resolution = (probe_pixels * plate.size / plate.size.maxCoeff()).array().ceil().max(1).cast<int>().matrix();
+  return plate;
+}
+
+/// The integral of the secondary principal difference that 99 of 100 rays through the field do not exceed.
+double greatest_integral(const Scene& scene, PolarizedLight light) {
+  const Geometry volume({scene.geometry.surfaces().bounds, scene.geometry.surfaces().cut, std::nullopt, {}});
+  light.bands.clear();
+  light.aperture.reset();
+  light.strength = 1;
+  light.samples = 1;
+  const Plate plate = silhouette(scene, light);
+  const PolarTracer tracer(scene.field, volume, light, plate);
+  std::vector<LightRow> rows(static_cast<std::size_t>(plate.resolution.y()));
+  tbb::parallel_for(std::size_t(0), rows.size(), [&](std::size_t y) { rows[y] = tracer.row(static_cast<int>(y)); });
+  std::vector<float> integrals;
+  for (const LightRow& row : rows)
+    for (const PolarPoint& point : row.points)
+      if (point.length > 0) integrals.push_back(point.integral / 2);
+  if (integrals.empty()) return 0;
+  const auto high = integrals.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(integrals.size() - 1));
+  std::nth_element(integrals.begin(), high, integrals.end());
+  return *high;
+}
+
+/// A number as it is printed, so that a scene can have the same.
+double rounded(double value) { return std::stod(fmt::format("{:.6g}", value)); }
+
+double choose_coefficient(const Scene& scene, const PolarizedLight& light, double unit_length, double wavelength,
+                          std::vector<std::string>& notes) {
+  const Eigen::Vector3d& V = light.direction;
+  const std::string key =
+      fmt::format("stress_optic {} {} {} {} {}", V.x(), V.y(), V.z(), unit_length, scene.geometry.has_cut());
+  std::shared_ptr<const double> known = scene.kept ? scene.kept->find<double>(key) : nullptr;
+  const double integral = known ? *known : greatest_integral(scene, light);
+  if (scene.kept && !known) scene.kept->keep(key, integral, sizeof integral);
+  if (!(integral > 0)) {
+    notes.push_back(
+        "warning: the field turns no polarisation (across the light, its principal values are equal, or light misses "
+        "the volume); stress_optic 1");
+    return 1;
+  }
+  const double chosen = rounded(auto_orders * wavelength * nanometre / (unit_length * integral));
+  notes.push_back(
+      fmt::format("stress_optic: {:g} (99 of 100 rays through the field have {:g} orders or fewer at {:g} "
+                  "nm); give that of the material to compare with a photograph",
+                  chosen, auto_orders, wavelength));
+  return chosen;
+}
+
+}  // namespace
+
+LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeDescription& settings,
+                                          std::vector<std::string>& notes) {
+  LoadedLightOfPolariscope loaded;
+  PolarizedLight& light = loaded.light;
+  const Plate& plate = *scene.geometry.surfaces().plate;
+  light.direction = scene.beam.direction;
+  light.up = upright(light.direction, plate.up);
+  light.right = light.direction.cross(light.up);
+  light.start = scene.beam.center;
+  light.bands = bands_of(scene);
+  light.reference = reference_channel(scene);
+  light.samples = settings.samples.value_or(2);
+  const double wavelength = loaded.wavelength = light.bands[light.reference].wavelength;
+  if (scene.description.light.aperture) {
+    light.aperture.emplace();
+    for (const Eigen::Vector2d& corner : scene.beam.aperture) {
+      const Eigen::Vector3d from_start = scene.beam.start(corner) - light.start;
+      light.aperture->extend(Eigen::Vector2d(from_start.dot(light.right), from_start.dot(light.up)));
+    }
+  }
+  light.relative = [wavelength](double other) { return wavelength / other; };
+  if (const auto* file = std::get_if<std::filesystem::path>(&settings.stress_optic)) {
+    const Spectrum table = read_coefficients(*file, scene.description.light, wavelength);
+    loaded.stress_optic = table.at(wavelength);
+    light.relative = [table, wavelength, at_reference = loaded.stress_optic](double other) {
+      const double inside =
+          std::clamp(other, table.wavelengths.front(), table.wavelengths.back());  // But for rounding.
+      return table.at(inside) / at_reference * wavelength / other;
+    };
+  } else if (const auto* number = std::get_if<double>(&settings.stress_optic)) {
+    loaded.stress_optic = *number;
+  } else {
+    loaded.is_automatic = true;
+    loaded.stress_optic = choose_coefficient(scene, light, settings.unit_length, wavelength, notes);
+  }
+  light.strength = pi * loaded.stress_optic * settings.unit_length / (wavelength * nanometre);
+  loaded.arrangement = turned(arrangement_of(settings.arrangement), settings.angle, settings.analyzer);
+  return loaded;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,260 @@
+#include "integrators/polariscope/polariscope.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "base/constants.h"
+#include "integrators/polariscope/differences.h"
+#include "integrators/polariscope/turning.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr std::size_t packet_rays = 32;  // Rays that are sampled side by side.
+constexpr int most_threes = 5;           // A band has 3⁵ wavelengths at most.
+constexpr int most_sections = 10000;     // Of a ray in the body: a limit that no body reaches.
+
+/// Middle of a step along its ray, from the plate, and its length.
+struct RayStep {
+  double middle, length;
+};
+
+/// From where to where a ray is in a box.
+struct Section {
+  double begin, end;
+};
+
+Section section_of(const Eigen::AlignedBox3d& box, const Vector3d& origin, const Vector3d& along) {
+  Section section{-std::numeric_limits<double>::infinity(), 0};  // The plate is at 0.
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = box.min()[axis] - origin[axis], high = box.max()[axis] - origin[axis];
+    if (along[axis] == 0) {
+      if (low > 0 || high < 0) section.end = section.begin;
+      continue;
+    }
+    section.begin = std::max(section.begin, std::min(low / along[axis], high / along[axis]));
+    section.end = std::min(section.end, std::max(low / along[axis], high / along[axis]));
+  }
+  return section;
+}
+
+}  // namespace
+
+struct PolarTracer::Ray {
+  Vector3d origin, index;  // On the plate, in world and in index space.
+  std::vector<RayStep> steps;
+  TurningSteps turning;
+  double phase = 0, length = 0;  // Σ √(a² + b²) h, at the reference; Σ h.
+  bool is_lit = true;
+
+  /// Keeps its memory.
+  void restart(double greatest) {
+    steps.clear();
+    turning.steps.clear();
+    turning.greatest = greatest;
+    phase = length = 0;
+    is_lit = true;
+  }
+};
+
+/// Rays, and arrays for their tensors.
+struct PolarTracer::Packet {
+  std::vector<Ray> rays;
+  DifferenceSampler sampler;
+  std::vector<std::size_t> active;
+  std::vector<Vector3d> points;
+  std::vector<float> a, b, planes;
+  std::vector<Eigen::Vector4d> means;  // By pixel, of quaternions w, x, y, z.
+  std::vector<int> inside;             // By pixel: samples in the field.
+};
+
+PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, const PolarizedLight& light,
+                         const Plate& plate)
+    : field_(field),
+      geometry_(geometry),
+      light_(light),
+      plate_(plate),
+      across_(field.to_index().linear() * light.direction),
+      steps_per_length_(std::ldexp(across_.norm(), field.levels() - 1)),
+      room_(turning_room(light.bands.size())) {
+  for (const Band& band : light.bands)
+    widest_ = std::max(widest_, std::abs(light.relative(band.wavelength + band.width / 2) -
+                                         light.relative(band.wavelength - band.width / 2)));
+  for (int threes = 0, count = 1; threes <= most_threes; ++threes, count *= 3) {
+    auto& level = strengths_.emplace_back();
+    for (int i = 0; i < count; ++i) {
+      std::vector<float>& strengths = level.emplace_back(room_, 0.0f);
+      for (std::size_t k = 0; k < light.bands.size(); ++k) {
+        const Band& band = light.bands[k];
+        strengths[k] = static_cast<float>(light.relative(band.wavelength + band.width * ((i + 0.5) / count - 0.5)));
+        greatest_ = std::max(greatest_, std::abs(static_cast<double>(strengths[k])));
+      }
+    }
+  }
+}
+
+const std::vector<std::vector<float>>& PolarTracer::wavelengths_for(double phase) const {
+  std::size_t threes = 0;
+  double change = 2 * phase * widest_;
+  for (; change > 1 && threes < most_threes; change /= 3) ++threes;
+  return strengths_[threes];
+}
+
+void PolarTracer::find_steps(Ray& ray) const {
+  const Vector3d& k = light_.direction;
+  const Vector3d from_start = ray.origin - light_.start;
+  if (light_.aperture) {
+    ray.is_lit = light_.aperture->contains(Eigen::Vector2d(from_start.dot(light_.right), from_start.dot(light_.up)));
+    if (!ray.is_lit) return;
+  }
+  if (!geometry_.surfaces().obstacles.empty()) {
+    const double way = from_start.dot(k);
+    const auto hit = geometry_.absorber(ray.origin - way * k, k, way);
+    ray.is_lit = !hit || hit->surface != Surface::obstacle;
+    if (!ray.is_lit) return;
+  }
+  const Section box = section_of(field_.index_bounds(), ray.index, across_);
+  const auto add_steps = [&](double begin, double end) {
+    if (!(end > begin)) return;
+    const double count = std::max(1.0, std::ceil((end - begin) * steps_per_length_ - 1e-6));
+    const double length = (end - begin) / count;
+    for (int i = 0; i < count; ++i) ray.steps.push_back({begin + (i + 0.5) * length, length});
+    ray.length += end - begin;
+  };
+  if (!(box.end > box.begin)) return;
+  if (!geometry_.has_cut()) return add_steps(box.begin, box.end);
+  double at = box.begin;
+  bool is_inside = geometry_.inside_cut(ray.origin + at * k, k);
+  for (int i = 0; i < most_sections; ++i) {
+    const auto hit = geometry_.crossing(Surface::cut, !is_inside, ray.origin + at * k, k, box.end - at);
+    const double next = hit ? at + hit->distance : box.end;
+    if (is_inside) add_steps(at, next);
+    if (!hit) return;
+    is_inside = !is_inside;
+    at = next;
+  }
+}
+
+/// Sets the exponents of all steps of all rays: step by step, as neighbours are in the same brick.
+void PolarTracer::sample(Packet& packet) const {
+  std::size_t most = 0;
+  for (const Ray& ray : packet.rays) most = std::max(most, ray.steps.size());
+  for (std::size_t step = 0; step < most; ++step) {
+    packet.active.clear();
+    for (std::size_t i = 0; i < packet.rays.size(); ++i)
+      if (step < packet.rays[i].steps.size()) packet.active.push_back(i);
+    const std::size_t count = packet.active.size();
+    packet.points.resize(2 * count);
+    for (std::size_t p = 0; p < 2 * count; ++p) {
+      const Ray& ray = packet.rays[packet.active[p % count]];
+      const RayStep& at = ray.steps[step];
+      packet.points[p] = ray.index + (at.middle + (p < count ? -gauss_point : gauss_point) * at.length) * across_;
+    }
+    packet.sampler.sample(packet.points, packet.a, packet.b);
+    for (std::size_t p = 0; p < count; ++p) {
+      Ray& ray = packet.rays[packet.active[p]];
+      const double h = ray.steps[step].length;
+      const double a1 = packet.a[p], b1 = packet.b[p], a2 = packet.a[count + p], b2 = packet.b[count + p];
+      ray.turning.add(h, a1, b1, a2, b2);
+      ray.phase += h * (std::sqrt(a1 * a1 + b1 * b1) + std::sqrt(a2 * a2 + b2 * b2)) / 2;
+    }
+  }
+}
+
+/// Adds a ray to the light of its pixel.
+void PolarTracer::add(const Ray& ray, float weight, std::size_t x, Packet& packet, LightRow& row) const {
+  if (!ray.is_lit) return;
+  row.lit[x] += weight;
+  float* const rotations = room_ > 0 ? &row.rotations[9 * room_ * x] : nullptr;
+  if (ray.steps.empty()) {
+    for (const std::size_t i : {0, 4, 8})
+      for (std::size_t k = 0; k < room_; ++k) rotations[i * room_ + k] += weight;
+    return;
+  }
+  PolarPoint& point = row.points[x];
+  point.integral += static_cast<float>(2 * ray.phase);
+  point.length += static_cast<float>(ray.length);
+  ++packet.inside[x];
+  if (room_ == 0) return;
+  packet.planes.resize(4 * room_);
+  const auto& wavelengths = wavelengths_for(ray.phase);
+  for (std::size_t i = 0; i < wavelengths.size(); ++i) {
+    turn(ray.turning, wavelengths[i].data(), room_, packet.planes.data());
+    add_rotations(packet.planes.data(), weight / static_cast<float>(wavelengths.size()), room_, rotations);
+    if (i == wavelengths.size() / 2)  // The middle of the band.
+      for (std::size_t c = 0; c < 4; ++c)
+        packet.means[x][static_cast<int>(c)] += packet.planes[c * room_ + light_.reference];
+  }
+}
+
+LightRow PolarTracer::row(int y) const {
+  const auto width = static_cast<std::size_t>(plate_.resolution.x()), n = static_cast<std::size_t>(light_.samples);
+  LightRow row;
+  row.room = room_;
+  row.rotations.resize(9 * room_ * width);
+  row.lit.resize(width);
+  row.points.resize(width);
+  Packet packet{{}, {field_, light_.right, light_.up, light_.strength}, {}, {}, {}, {}, {}, {}, {}};
+  packet.means.assign(width, Eigen::Vector4d::Zero());
+  packet.inside.assign(width, 0);
+  for (std::size_t line = 0; line < n; ++line)
+    for (std::size_t begin = 0; begin < width * n; begin += packet_rays) {
+      const std::size_t end = std::min(begin + packet_rays, width * n);
+      packet.rays.resize(end - begin);
+      for (std::size_t i = begin; i < end; ++i) {
+        Ray& ray = packet.rays[i - begin];
+        ray.restart(greatest_);
+        ray.origin = plate_.to_world(
+            (Eigen::Vector2d(static_cast<double>(i), static_cast<double>(line)).array() + 0.5).matrix() /
+                light_.samples +
+            Eigen::Vector2d(0, y));
+        ray.index = field_.to_index() * ray.origin;
+        find_steps(ray);
+      }
+      sample(packet);
+      for (std::size_t i = begin; i < end; ++i)
+        add(packet.rays[i - begin], 1 / static_cast<float>(n * n), i / n, packet, row);
+    }
+  for (std::size_t x = 0; x < width; ++x) {
+    if (packet.inside[x] == 0) continue;
+    PolarPoint& point = row.points[x];
+    point.integral /= static_cast<float>(packet.inside[x]);
+    point.length /= static_cast<float>(packet.inside[x]);
+    // The mean of unitary matrices is that of the middle, as they are smooth.
+    const Eigen::Vector4d mean = packet.means[x].normalized();
+    const EquivalentRetarder retarder = equivalent_retarder({mean[0], mean[1], mean[2], mean[3]});
+    point.phase = static_cast<float>(retarder.phase);
+    point.azimuth = static_cast<float>(retarder.azimuth);
+    point.rotation = static_cast<float>(retarder.rotation);
+  }
+  return row;
+}
+
+PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, std::size_t room)
+    : through_(room), by_rotation_(9 * room) {
+  for (std::size_t k = 0; k < bands.size(); ++k) {
+    const Analysis& analysis = analyses_.emplace_back(analysis_of(arrangement, bands[k].wavelength));
+    through_[k] = static_cast<float>(analysis.through);
+    for (int i = 0; i < 9; ++i)
+      by_rotation_[static_cast<std::size_t>(i) * room + k] = static_cast<float>(analysis.by_rotation(i / 3, i % 3));
+  }
+}
+
+void PolarView::powers(const LightRow& row, std::size_t x, float* powers) const {
+  const float* const rotations = row.of_pixel(x);
+  for (std::size_t k = 0; k < row.room; ++k) powers[k] = row.lit[x] * through_[k];
+  for (std::size_t i = 0; i < 9 * row.room; i += row.room)
+    for (std::size_t k = 0; k < row.room; ++k) powers[k] += by_rotation_[i + k] * rotations[i + k];
+}
+
+Eigen::Vector4d PolarView::stokes(const LightRow& row, std::size_t x, std::size_t band) const {
+  Eigen::Matrix3d R;
+  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = row.of_pixel(x)[static_cast<std::size_t>(i) * row.room + band];
+  return analyses_[band].stokes(R, row.lit[x]);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,279 @@
+#include "integrators/polariscope/polariscope_method.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "base/constants.h"
+#include "base/process/seconds.h"
+#include "integrators/polariscope/load_polariscope.h"
+#include "integrators/polariscope/polariscope_legend.h"
+#include "renderer/film/spectral_image.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/outputs/body_outline.h"
+#include "scenes/outputs/channel_table.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "scenes/scene/kept_results.h"
+
+namespace tensorray {
+namespace {
+
+constexpr std::size_t rows_per_round = 64;  // That are traced before others get them.
+constexpr double few_orders = 0.02;         // A picture with fewer shows nothing.
+
+/// What is known of a pixel.
+struct PolarPixel {
+  Eigen::Vector3d color;
+  const PolarPoint& point;
+  double nanometres;  ///< Of a phase of 1.
+};
+
+ChannelTable<PolarPixel> polariscope_channels() {
+  using Pixel = const PolarPixel&;
+  return {{{"R", "G", "B"}, [](Pixel pixel) { return pixel.color; }},
+          {{"A"}, [](Pixel) { return 1; }},
+          {{"retardance"}, [](Pixel pixel) { return pixel.nanometres * pixel.point.phase; }},
+          {{"integral"}, [](Pixel pixel) { return pixel.nanometres * pixel.point.integral; }},
+          {{"azimuth"}, [](Pixel pixel) { return pixel.point.azimuth; }},
+          {{"rotation"}, [](Pixel pixel) { return pixel.point.rotation; }},
+          {{"length"}, [](Pixel pixel) { return pixel.point.length; }}};
+}
+
+constexpr std::size_t retardance_channel = 4, integral_channel = 5, azimuth_channel = 6, length_channel = 8;
+
+/// The rows of a picture, as far as they are made.
+struct PolarPicture {
+  Image image;
+  std::size_t spectra = 0;  ///< Numbers of a pixel in `spectrum`.
+  std::vector<float>
+      spectrum;  ///< By pixels: each band's power, or S0 of all bands, then S1, S2, S3; empty: not wanted.
+};
+
+/// Turns traced light into pixels.
+class PolarDrawing {
+ public:
+  PolarDrawing(const Scene& scene, const LoadedLightOfPolariscope& loaded, std::size_t room)
+      : bands_(loaded.light.bands),
+        view_(loaded.arrangement, bands_, room),
+        nanometres_(loaded.wavelength / (2 * pi)),
+        stokes_(scene.description.output.stokes) {
+    const Eigen::Matrix3d xyz_to_working = to_working(scene);
+    for (const Band& band : bands_) colors_.emplace_back(xyz_to_working * band.xyz);
+  }
+
+  void draw(const LightRow& row, std::size_t y, PolarPicture& picture) const {
+    const auto width = static_cast<std::size_t>(picture.image.width);
+    std::vector<float> powers(row.room);
+    for (std::size_t x = 0; x < width; ++x) {
+      view_.powers(row, x, powers.data());
+      Eigen::Vector3d color = Eigen::Vector3d::Zero();
+      for (std::size_t k = 0; k < bands_.size(); ++k) color += powers[k] * colors_[k];
+      write_channels(table_, {color, row.points[x], nanometres_},
+                     picture.image.pixel(static_cast<int>(x), static_cast<int>(y)));
+      if (picture.spectra == 0) continue;
+      float* const to = &picture.spectrum[(y * width + x) * picture.spectra];
+      for (std::size_t k = 0; k < bands_.size(); ++k) {
+        if (!stokes_) {
+          to[k] = powers[k];
+          continue;
+        }
+        const Eigen::Vector4d stokes = view_.stokes(row, x, k);
+        for (int s = 0; s < 4; ++s) to[static_cast<std::size_t>(s) * bands_.size() + k] = static_cast<float>(stokes[s]);
+      }
+    }
+  }
+
+ private:
+  std::vector<Band> bands_;
+  PolarView view_;
+  double nanometres_;
+  bool stokes_;
+  std::vector<Eigen::Vector3d> colors_;
+  ChannelTable<PolarPixel> table_ = polariscope_channels();
+};
+
+/// Radiance by bands; with Stokes' parameters S1, S2 and S3 before S0. Its colours are the picture's.
+SpectralImage spectral_picture(const PolarPicture& picture, const Scene& scene) {
+  const std::size_t count = scene.bands.size();
+  const std::vector<std::size_t> parameters =
+      picture.spectra > count ? std::vector<std::size_t>{1, 2, 3, 0} : std::vector<std::size_t>{0};
+  Film film(picture.image.width, picture.image.height, static_cast<int>(picture.spectra));
+  std::vector<Band> bands;
+  for (const std::size_t s : parameters)
+    for (std::size_t k = 0; k < count; ++k) {
+      double* const plane = film.plane(static_cast<int>(bands.size()));
+      for (std::size_t i = 0; i < film.plane_size(); ++i)
+        plane[i] = picture.spectrum[i * picture.spectra + s * count + k];
+      bands.push_back(scene.bands[k]);
+    }
+  SpectralImage result = spectral_image(film, bands, SpectralQuantity::radiance,
+                                        scene.description.light.irradiance / pi, to_working(scene));
+  for (std::size_t c = 0; c < bands.size(); ++c)
+    result.image.channels[3 + c][1] = static_cast<char>('0' + parameters[c / count]);
+  for (int y = 0; y < film.height; ++y)
+    for (int x = 0; x < film.width; ++x) std::copy_n(picture.image.pixel(x, y), 3, result.image.pixel(x, y));
+  result.bands = scene.bands;
+  if (parameters.size() > 1) result.metadata["polarisationHandedness"] = "right";
+  return result;
+}
+
+/// The greatest integral of the picture, and that which 99 of 100 pixels of the field do not exceed; nm.
+std::pair<double, double> greatest_retardances(const Image& image) {
+  std::vector<float> values;
+  for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
+    if (image.pixels[i + length_channel] > 0) values.push_back(image.pixels[i + integral_channel]);
+  if (values.empty()) return {0, 0};
+  const auto high = values.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), high, values.end());
+  return {*std::max_element(high, values.end()), *high};
+}
+
+class LoadedPolariscope : public LoadedMethod {
+ public:
+  LoadedPolariscope(PolariscopeDescription settings, LoadedLightOfPolariscope loaded)
+      : settings_(std::move(settings)), loaded_(std::move(loaded)) {}
+
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
+
+  Strength strength(const Scene&) const override { return {"integrator", "stress_optic", loaded_.stress_optic}; }
+
+ private:
+  using Rows = std::vector<LightRow>;
+
+  std::string traced_key(const Scene& scene) const;
+  Render render_of(const Scene& scene, const PolarPicture& picture) const;
+
+  PolariscopeDescription settings_;
+  LoadedLightOfPolariscope loaded_;
+};
+
+/// All that traced light depends on, the field aside.
+std::string LoadedPolariscope::traced_key(const Scene& scene) const {
+  Json json = Json::parse(scene.description.text);
+  for (const char* key : {"output", "camera", "lights", "objects", "seed"}) json.erase(key);
+  for (const char* key : {"arrangement", "angle", "analyzer", "type"}) json["integrator"].erase(key);
+  const Eigen::Vector3d& V = loaded_.light.direction;
+  return json.dump() + fmt::format(" {} {} {} {}", V.x(), V.y(), V.z(), loaded_.stress_optic);
+}
+
+/// What is shown of the picture, which may not be complete.
+Render LoadedPolariscope::render_of(const Scene& scene, const PolarPicture& picture) const {
+  Render result;
+  result.linear = picture.image;
+  result.exposure = 0;
+  const Plate& plate = *scene.geometry.surfaces().plate;
+  result.view = picture_view(plate);
+  result.outline = body_outline(scene, plate);
+  const auto [greatest, shown] = greatest_retardances(picture.image);
+  const double order = greatest / loaded_.wavelength;
+  result.notes.push_back(
+      fmt::format("greatest order: {:.3g} at {:g} nm (retardance {:.4g} nm)", order, loaded_.wavelength, greatest));
+  if (greatest > 0 && order < few_orders)
+    result.warnings.push_back(
+        "the picture shows almost nothing: the retardance is far below a wavelength; check the units of "
+        "`integrator.stress_optic` and `integrator.unit_length`, or leave the first to \"auto\"");
+  result.metadata = {{"tensorray:stress_optic", fmt::format("{:.17g}", loaded_.stress_optic)},
+                     {"tensorray:wavelength", fmt::format("{:.17g}", loaded_.wavelength)}};
+  result.draw_legend = polariscope_legend(scene, loaded_, settings_, shown > 0 ? shown : loaded_.wavelength);
+  result.describe_pixel = [wavelength = loaded_.wavelength](const float* pixel) {
+    return std::vector<std::pair<std::string, std::string>>{
+        {"order", fmt::format("{:.3f} at {:.1f} nm", pixel[integral_channel] / wavelength, wavelength)},
+        {"slow axis", fmt::format("{:.1f} degrees", pixel[azimuth_channel] * 180 / pi)}};
+  };
+  return result;
+}
+
+Render LoadedPolariscope::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
+  const auto start = Clock::now();
+  const Plate& plate = *scene.geometry.surfaces().plate;
+  const PolarTracer tracer(scene.field, scene.geometry, loaded_.light, plate);
+  const PolarDrawing drawing(scene, loaded_, tracer.room());
+  const auto width = static_cast<std::size_t>(plate.resolution.x()),
+             height = static_cast<std::size_t>(plate.resolution.y());
+  PolarPicture picture;
+  picture.image = Image(plate.resolution.x(), plate.resolution.y(), channel_names(polariscope_channels()));
+  if (scene.description.output.wants("spectral"))
+    picture.spectra = scene.bands.size() * (scene.description.output.stokes ? 4 : 1);
+  picture.spectrum.resize(width * height * picture.spectra);
+
+  const std::string key = traced_key(scene);
+  const std::shared_ptr<const Rows> known = scene.kept ? scene.kept->find<Rows>(key) : nullptr;
+  const std::size_t bytes = width * height * (9 * tracer.room() + 6) * sizeof(float);
+  const bool keeps = scene.kept && !known && bytes <= KeptResults::max_bytes;
+  Rows traced(keeps ? height : 0);
+
+  Units rows;
+  rows.count = height;
+  rows.kind = "polarised row";
+  rows.round = rows_per_round;
+  rows.make = [&](std::size_t y) {
+    if (known) return drawing.draw((*known)[y], y, picture);
+    LightRow row = tracer.row(static_cast<int>(y));
+    drawing.draw(row, y, picture);
+    if (keeps) traced[y] = std::move(row);
+  };
+  rows.copy = [&](std::size_t y, Archive& archive) {
+    const std::size_t pixels = width * picture.image.channels.size(), numbers = width * picture.spectra;
+    archive.copy(&picture.image.pixels[y * pixels], pixels * sizeof(float));
+    if (numbers > 0) archive.copy(&picture.spectrum[y * numbers], numbers * sizeof(float));
+  };
+  if (job)
+    rows.shown = [&] {
+      if (job->takes_picture_request()) job->show(render_of(scene, picture));
+    };
+  make_units(rows, job, "tracing rays", progress);
+  if (keeps) scene.kept->keep(key, std::move(traced), bytes);
+  if (job && (job->is_shard || !is_root(job->ranks))) return {};
+
+  Render result = render_of(scene, picture);
+  if (picture.spectra > 0) result.spectral = spectral_picture(picture, scene);
+  result.statistics.seconds_tracing = seconds_since(start);
+  return result;
+}
+
+class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
+ public:
+  const char* name() const override { return "polariscope"; }
+  bool shows_plate() const override { return true; }
+  bool bends_light() const override { return false; }
+
+  std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
+
+  std::vector<NamedFile> inputs() const override {
+    const auto* file = std::get_if<std::filesystem::path>(&settings().stress_optic);
+    return {{file ? *file : std::filesystem::path(), "`/integrator/stress_optic`"}};
+  }
+
+  /// Bends nothing: the scale is not chosen, and eigenvalues stay what they are.
+  void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
+    if (!chosen) return;
+    if (scene.bending.rgb) source.fail("`/bending/rgb`: the polariscope needs light with wavelengths; remove it");
+    if (given(json, "/field/scale"))
+      scene.warnings.push_back("`/field/scale` has no effect with polariscope; its key is `/integrator/stress_optic`");
+    if (scene.field.eigenvalues == Eigenvalues::automatic) scene.field.eigenvalues = Eigenvalues::raw;
+    if (scene.field.eigenvalues != Eigenvalues::raw)
+      scene.warnings.push_back(
+          "`/field/eigenvalues`: the polariscope shows differences of principal values, which these change; \"auto\" "
+          "keeps them");
+    scene.field.scale = 1;
+    scene.bending.flexibility = {0, 0};  // Of the rays that the live view draws.
+    if (scene.output.stokes && !scene.output.wants("spectral"))
+      scene.warnings.push_back("`/output/stokes` has no effect without `/output/spectral`");
+    const double picture = static_cast<double>(channel_names(polariscope_channels()).size()) * sizeof(float);
+    const double spectral =
+        scene.output.wants("spectral") ? channel_count(scene) * (scene.output.stokes ? 4.0 : 1.0) : 0;
+    check_receiver_memory(scene, 2 * picture + spectral * (4 * sizeof(float) + sizeof(double)), source);
+  }
+
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
+    return std::make_unique<LoadedPolariscope>(settings(), load_polariscope(scene, settings(), notes));
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<Method> polariscope_method() { return std::make_shared<PolariscopeMethod>(); }
+
+}  // namespace tensorray

@@ -1,0 +1,392 @@
+// Compares polarised light in stressed bodies with closed forms.
+
+#include "integrators/polariscope/polariscope.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "base/constants.h"
+#include "integrators/polariscope/polariscope_method.h"
+#include "integrators/polariscope/turning.h"
+#include "tests/tracing/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix2cd;
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+Quaterniond retarder(double delta, double axis) {
+  const double half = delta / 2;
+  return {std::cos(half), std::sin(half) * std::cos(2 * axis), std::sin(half) * std::sin(2 * axis), 0};
+}
+
+Quaterniond rotation(double angle) { return {std::cos(angle), 0, 0, std::sin(angle)}; }
+
+/// Differences of matrices but for their sign.
+double distance(const Quaterniond& a, const Quaterniond& b) {
+  return std::min((a.coeffs() - b.coeffs()).norm(), (a.coeffs() + b.coeffs()).norm());
+}
+
+/// Light along −z, in frames as a receiver's; a band of no width for each wavelength.
+PolarizedLight light_along(const Vector3d& direction, const std::vector<double>& wavelengths = {550}) {
+  PolarizedLight light;
+  light.direction = direction.normalized();
+  light.up = upright(light.direction, Vector3d::UnitY());
+  light.right = light.direction.cross(light.up);
+  light.start = -10 * light.direction;
+  for (const double wavelength : wavelengths) light.bands.push_back({wavelength, 0, 1, Vector3d::Ones()});
+  light.relative = [first = wavelengths.front()](double wavelength) { return first / wavelength; };
+  light.samples = 1;
+  return light;
+}
+
+Plate plate_of(const PolarizedLight& light, const Eigen::Vector2i& resolution, double size = 1) {
+  Plate plate;
+  plate.center = 5 * light.direction;
+  plate.right = light.right;
+  plate.up = light.up;
+  plate.size = size * resolution.cast<double>() / resolution.maxCoeff();
+  plate.resolution = resolution;
+  return plate;
+}
+
+LightRow row_of(const TensorField& field, const PolarizedLight& light, const Plate& plate, int y = 0,
+                Surfaces surfaces = {}) {
+  surfaces.bounds = surfaces_of(field).bounds;
+  const Geometry geometry(std::move(surfaces));
+  return PolarTracer(field, geometry, light, plate).row(y);
+}
+
+/// The mean rotation of a pixel in a band.
+Matrix3d rotation_of(const LightRow& row, std::size_t x = 0, std::size_t band = 0) {
+  Matrix3d R;
+  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = row.of_pixel(x)[static_cast<std::size_t>(i) * row.room + band];
+  return R;
+}
+
+/// What a field does to the light through the middle of the volume.
+Quaterniond unitary_of(const TensorField& field, const PolarizedLight& light) {
+  return Quaterniond(rotation_of(row_of(field, light, plate_of(light, {1, 1}))));
+}
+
+/// Principal values ±½ across z, the greater one at an angle from x towards y.
+Matrix3d plane_stress(double difference, double angle) {
+  Matrix3d T = Matrix3d::Zero();
+  T(0, 0) = difference / 2 * std::cos(2 * angle);
+  T(1, 1) = -T(0, 0);
+  T(0, 1) = T(1, 0) = difference / 2 * std::sin(2 * angle);
+  return T;
+}
+
+/// The table of arrangements: what a plate with a phase δ and axes at θ shows.
+TEST(Polariscope, ArrangementsShowAPlateAsTheirFormulasSay) {
+  for (const double delta : {0.0, 0.7, 2.0, pi, 5.5})
+    for (const double axis : {0.0, 0.3, pi / 4, 1.2, 2.5}) {
+      const double fringe = std::pow(std::sin(delta / 2), 2), brush = std::pow(std::sin(2 * axis), 2) * fringe;
+      // The full-wave plate, whose fast axis is at 45°, subtracts the part of the plate along it.
+      const Quaterniond tint = retarder(delta, axis) * retarder(-2 * pi, pi / 4);
+      const double through = std::pow(tint.x() * 0 + tint.y(), 2) + std::pow(tint.z(), 2);
+      const std::vector<std::pair<ArrangementWord, double>> cases{{ArrangementWord::circular, fringe},
+                                                                  {ArrangementWord::circular_light, 1 - fringe},
+                                                                  {ArrangementWord::plane, brush},
+                                                                  {ArrangementWord::plane_light, 1 - brush},
+                                                                  {ArrangementWord::tint, through}};
+      for (const auto& [word, expected] : cases) {
+        const Matrix3d R = retarder(delta, axis).toRotationMatrix();
+        const Analysis analysis = analysis_of(arrangement_of(word), 550);
+        EXPECT_NEAR(analysis.power(R), expected, 1e-12) << choice_name(word) << " " << delta << " " << axis;
+        const Eigen::Vector4d S = analysis.stokes(R);
+        EXPECT_NEAR(S[0] * S[0], S.tail<3>().squaredNorm(), 1e-12);
+        EXPECT_NEAR(S[0], 1, 1e-12);
+        // All elements turned with the specimen.
+        const Matrix3d turned_R = retarder(delta, axis + 0.4).toRotationMatrix();
+        const Arrangement all = turned(arrangement_of(word), 0.4 * 180 / pi, 0);
+        EXPECT_NEAR(analysis_of(all, 550).power(turned_R), expected, 1e-12);
+      }
+    }
+}
+
+/// Tardy's method: where axes are those of the polariser, the analyser is dark at half the phase.
+TEST(Polariscope, TheAnalyserMeasuresFractionsOfAnOrder) {
+  for (const double delta : {0.4, 1.7, 2.9}) {
+    const auto power = [&](double analyzer) {
+      const Arrangement before{{{ElementKind::polarizer, 45}},
+                               {{ElementKind::quarter_wave, 45}, {ElementKind::polarizer, 135}}};
+      return analysis_of(turned(before, 0, analyzer), 550).power(retarder(delta, 0).toRotationMatrix());
+    };
+    const double angle = delta / 2 * 180 / pi;
+    EXPECT_NEAR(std::min(power(angle), power(-angle)), 0, 1e-12) << delta;
+  }
+}
+
+/// Circular light: of a plate of a quarter wave at 45° behind a polariser.
+TEST(Polariscope, StokesParametersKnowTheSenseOfCircularLight) {
+  // The slow axis, at 45°, is behind: its wave comes later, so that the picture shows light that turns clockwise, and
+  // who faces the light sees it turn the other way.
+  const Analysis analysis = analysis_of({{{ElementKind::polarizer, 0}}, {{ElementKind::polarizer, 90}}}, 550);
+  const Eigen::Vector4d S = analysis.stokes(retarder(pi / 2, pi / 4).toRotationMatrix());
+  const Eigen::Vector2cd jones =
+      jones_matrix({{ElementKind::polarizer, 0}, {ElementKind::quarter_wave, -45}}, 550) * Eigen::Vector2cd(1, 0);
+  // E exp(iωt): the phase of w before that of u is positive where w comes first.
+  const double phase = std::arg(jones[1] / jones[0]);
+  EXPECT_NEAR(std::abs(phase), pi / 2, 1e-12);
+  EXPECT_NEAR(S[3], phase > 0 ? -1 : 1, 1e-12);
+  EXPECT_NEAR(S.segment<2>(1).norm(), 0, 1e-12);
+}
+
+TEST(Polariscope, EveryUnitaryMatrixIsARotationThenARetarder) {
+  for (const double delta : {0.2, 1.5, 3.0})
+    for (const double axis : {-1.2, 0.1, 1.4})
+      for (const double turn : {-1.5, -0.3, 0.8}) {
+        const EquivalentRetarder found = equivalent_retarder(retarder(delta, axis) * rotation(turn));
+        EXPECT_NEAR(found.phase, delta, 1e-12);
+        EXPECT_NEAR(found.azimuth, axis, 1e-12);
+        EXPECT_NEAR(found.rotation, turn, 1e-12);
+      }
+}
+
+/// Bands of a uniform plate. Single precision resolves 1e-6 of the phase.
+TEST(Polariscope, AUniformPlateIsExactInEveryBand) {
+  const std::vector<double> wavelengths{550, 380, 430, 610, 730};
+  for (const double orders : {0.1, 1.0, 3.7, 12.0})
+    for (const double axis : {0.0, 0.4, 2.0}) {
+      const TensorField field = constant_field(plane_stress(1, axis));
+      PolarizedLight light = light_along(-Vector3d::UnitZ(), wavelengths);
+      light.strength = pi * orders / 2;  // The cube is 2 thick.
+      const LightRow row = row_of(field, light, plate_of(light, {1, 1}));
+      for (std::size_t k = 0; k < wavelengths.size(); ++k) {
+        const double delta = 2 * pi * orders * 550 / wavelengths[k];
+        EXPECT_LT((rotation_of(row, 0, k) - retarder(delta, axis).toRotationMatrix()).cwiseAbs().maxCoeff(), 1e-5)
+            << orders << " " << axis << " " << wavelengths[k];
+      }
+      EXPECT_NEAR(row.points[0].integral, 2 * pi * orders, 1e-5 * orders);
+      EXPECT_NEAR(row.points[0].length, 2, 1e-6);
+    }
+}
+
+/// A band in which the phase changes by many periods has the mean of all its wavelengths: the closed form is that of a
+/// phase that is spread evenly, but for the curve of 1/λ.
+TEST(Polariscope, AWideBandIsTheMeanOfItsWavelengths) {
+  const TensorField field = constant_field(plane_stress(1, 0));
+  for (const double orders : {0.5, 3.0, 20.0, 60.0}) {
+    PolarizedLight light = light_along(-Vector3d::UnitZ());
+    light.bands[0].width = 60;
+    light.strength = pi * orders / 2;
+    double mean = 0;
+    constexpr int many = 20000;
+    for (int i = 0; i < many; ++i) mean += std::cos(2 * pi * orders * 550 / (520 + 60 * (i + 0.5) / many)) / many;
+    const double change = 2 * pi * orders * 60 / 550;
+    // Midpoints no more than 1 apart in phase leave 1/24 of what cancels.
+    EXPECT_NEAR(rotation_of(row_of(field, light, plate_of(light, {1, 1})))(1, 1), mean,
+                change <= 1 ? change * change / 20 : 0.05)
+        << orders;
+  }
+}
+
+/// Axes that turn at a constant rate: total phase d, total turn ϕ.
+Quaterniond twisted(double d, double turn) {
+  const double g = std::hypot(d / 2, turn);
+  return rotation(turn) * Quaterniond(std::cos(g), std::sin(g) / g * d / 2, 0, -std::sin(g) / g * turn);
+}
+
+TEST(Polariscope, StepsOfTurningAxesHaveFourthOrder) {
+  constexpr double d = 9, turn_of_axes = 2.5;
+  std::vector<double> errors;
+  for (const int count : {4, 8, 16}) {
+    TurningSteps steps;
+    const double h = 1.0 / count;
+    for (int i = 0; i < count; ++i) {
+      const auto a = [&](double z) { return d / 2 * std::cos(2 * turn_of_axes * z); };
+      const auto b = [&](double z) { return d / 2 * std::sin(2 * turn_of_axes * z); };
+      const double z1 = (i + 0.5 - gauss_point) * h, z2 = (i + 0.5 + gauss_point) * h;
+      steps.add(h, a(z1), b(z1), a(z2), b(z2));
+    }
+    const std::vector<float> strengths(turning_room(1), 1.0f);
+    std::vector<float> q(4 * strengths.size());
+    turn(steps, strengths.data(), strengths.size(), q.data());
+    const Quaterniond found(q[0], q[strengths.size()], q[2 * strengths.size()], q[3 * strengths.size()]);
+    EXPECT_NEAR(found.norm(), 1, 1e-6);
+    errors.push_back(distance(found, twisted(d, turn_of_axes)));
+  }
+  EXPECT_GT(errors[0] / errors[1], 12) << errors[0] << " " << errors[1];
+  EXPECT_GT(errors[1] / errors[2], 12) << errors[1] << " " << errors[2];
+  EXPECT_LT(errors[2], 1e-3);
+}
+
+/// A step a voxel, and a cubic interpolant of order 4: together they have order 4 in the voxel.
+TEST(Polariscope, ATwistedRetarderConvergesWithTheVoxels) {
+  constexpr double d = 6, turn_of_axes = 1.5;
+  std::vector<double> errors;
+  for (const int voxels : {9, 17, 33}) {
+    // Light along −z comes in at z = 1. Along −z, x is to the right and y up.
+    const TensorField field =
+        TensorField(cube_grid(Eigen::Vector3i::Constant(voxels),
+                              [&](const Vector3d& p) { return plane_stress(1, turn_of_axes * (1 - p.z()) / 2); }),
+                    {Interpolation::cubic});
+    PolarizedLight light = light_along(-Vector3d::UnitZ());
+    light.strength = d / 4;  // φ = d/2 over a length of 2.
+    errors.push_back(distance(unitary_of(field, light), twisted(d, turn_of_axes)));
+  }
+  EXPECT_GT(errors[0] / errors[1], 8) << errors[0] << " " << errors[1];
+  EXPECT_LT(errors[2], 1e-4);
+}
+
+/// A closed cylinder about y, as a prism within it.
+TriangleMesh cylinder(double radius, int sides) {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, -0.9, 0}, {0, 0.9, 0}};
+  for (int i = 0; i < sides; ++i)
+    for (const double y : {-0.9, 0.9})
+      mesh.vertices.emplace_back(radius * std::cos(2 * pi * i / sides), y, radius * std::sin(2 * pi * i / sides));
+  for (int i = 0; i < sides; ++i) {
+    const auto a = static_cast<std::uint32_t>(2 + 2 * i), b = static_cast<std::uint32_t>(2 + 2 * ((i + 1) % sides));
+    mesh.triangles.insert(mesh.triangles.end(), {{a, a + 1, b + 1}, {a, b + 1, b}, {0, a, b}, {1, b + 1, a + 1}});
+  }
+  return mesh;
+}
+
+/// Glass with axial stress 1 − 2r²/R²: C · 2 [L − 2 (L³/3 + x² L)/R²], L = √(R² − x²).
+TEST(Polariscope, ACylinderEndsAtItsSurface) {
+  constexpr double R = 0.8;
+  const TensorField field = TensorField(cube_grid(Eigen::Vector3i::Constant(17),
+                                                  [&](const Vector3d& p) {
+                                                    Matrix3d T = Matrix3d::Zero();
+                                                    T(1, 1) = 1 - 2 * (p.x() * p.x() + p.z() * p.z()) / (R * R);
+                                                    return T;
+                                                  }),
+                                        {Interpolation::cubic});
+  PolarizedLight light = light_along(-Vector3d::UnitZ());
+  light.strength = 0.5;
+  const Plate plate = plate_of(light, {64, 1}, 2);
+  Surfaces surfaces;
+  surfaces.cut = cylinder(R, 400);
+  const LightRow row = row_of(field, light, plate, 0, std::move(surfaces));
+  for (int i = 0; i < 64; ++i) {
+    const double x = plate.to_world({i + 0.5, 0.5}).x(), L = std::sqrt(std::max(0.0, R * R - x * x));
+    const double expected = 2 * light.strength * 2 * (L - 2 * (L * L * L / 3 + x * x * L) / (R * R));
+    const PolarPoint& point = row.points[static_cast<std::size_t>(i)];
+    // The prism is thinner by π²/(2 · 400²) of R, where it is seen obliquely by more.
+    EXPECT_NEAR(point.length, 2 * L, 2e-3) << x;
+    EXPECT_NEAR(point.phase, std::abs(expected), 2e-3) << x;
+    if (std::abs(expected) > 0.05) {
+      EXPECT_NEAR(std::abs(point.azimuth), expected > 0 ? pi / 2 : 0, 1e-3) << x;
+    }
+  }
+}
+
+/// Stress in a disc of radius 1 that forces of 1 press along y (thickness 1).
+Matrix3d disc_stress(const Vector3d& p) {
+  const double x = p.x(), below = 1 - p.y(), above = 1 + p.y();
+  const double r1 = std::pow(x * x + below * below, 2), r2 = std::pow(x * x + above * above, 2);
+  Matrix3d T = Matrix3d::Zero();
+  T(0, 0) = -2 / pi * (below * x * x / r1 + above * x * x / r2 - 0.5);
+  T(1, 1) = -2 / pi * (below * below * below / r1 + above * above * above / r2 - 0.5);
+  T(0, 1) = T(1, 0) = 2 / pi * (below * below * x / r1 - above * above * x / r2);
+  return T;
+}
+
+/// The greatest error of the picture where |y| < 0.7, as a part of white.
+double disc_error(int voxels) {
+  // Voxels are about the loads, not at them.
+  Eigen::Affine3d placement = Eigen::Affine3d::Identity();
+  placement.linear().diagonal() << 0.985, 0.985, 0.5;
+  const TensorField field = TensorField(cube_grid({voxels, voxels, 2}, disc_stress, placement), {Interpolation::cubic});
+  PolarizedLight light = light_along(-Vector3d::UnitZ());
+  const double orders = 3;                  // At the middle: σ₁ − σ₂ = 4/π.
+  light.strength = pi * orders / (4 / pi);  // The slab is 1 thick.
+  const Plate plate = plate_of(light, {150, 150}, 1.9);
+  const PolarView view(arrangement_of(ArrangementWord::circular), light.bands, turning_room(1));
+  double error = 0;
+  for (int y = 0; y < 150; y += 7) {
+    const LightRow row = row_of(field, light, plate, y);
+    for (std::size_t x = 0; x < 150; ++x) {
+      const Vector3d p = plate.to_world({static_cast<double>(x) + 0.5, y + 0.5});
+      const double r2 = p.x() * p.x() + p.y() * p.y();
+      if (r2 > 0.9 || std::abs(p.y()) > 0.7) continue;
+      const double difference = 4 / pi * (1 - r2) / (std::pow(r2 + 1, 2) - 4 * p.y() * p.y());
+      std::vector<float> powers(row.room);
+      view.powers(row, x, powers.data());
+      error = std::max(error, std::abs(powers[0] - std::pow(std::sin(light.strength * difference), 2)));
+    }
+  }
+  return error;
+}
+
+TEST(Polariscope, ADiscUnderTwoLoadsIsTheFormulaAndConverges) {
+  const double coarse = disc_error(65), fine = disc_error(129), finest = disc_error(256);
+  EXPECT_LT(finest, 1e-3);
+  EXPECT_GT(coarse / fine, 8) << coarse << " " << fine << " " << finest;
+}
+
+/// A field whose axes turn along every way through it.
+Matrix3d general_tensor(const Vector3d& p) {
+  Matrix3d T;
+  T << std::sin(p.x() + p.z()), 0.4 * p.y(), 0.3, 0.2 * p.z(), std::cos(p.y() - p.z()), p.x() * p.z(), 0.5 * p.y(), 0.1,
+      p.z() * p.z() - p.x();
+  return T;
+}
+
+TEST(Polariscope, WhatCannotMatterDoesNot) {
+  const Vector3d direction = Vector3d(0.3, -0.2, -0.9).normalized();
+  PolarizedLight light = light_along(direction);
+  light.strength = 2;
+  const TensorField field = cube_field(17, general_tensor);
+  const Quaterniond expected = unitary_of(field, light);
+
+  Matrix3d more = Matrix3d::Identity() * 0.7;  // A multiple of the identity, and an antisymmetric part.
+  more(0, 1) += 0.5;
+  more(1, 0) -= 0.5;
+  more(1, 2) -= 0.8;
+  more(2, 1) += 0.8;
+  const TensorField other = cube_field(17, [&](const Vector3d& p) -> Matrix3d { return general_tensor(p) + more; });
+  EXPECT_LT(distance(unitary_of(other, light), expected), 1e-5);
+
+  // Field, light and plate turned together.
+  const Eigen::Affine3d turn(Eigen::AngleAxisd(0.8, Vector3d(1, 2, -1).normalized()));
+  const TensorField turned_field = cube_field(
+      17,
+      [&](const Vector3d& p) -> Matrix3d {
+        return turn.linear() * general_tensor(turn.inverse() * p) * turn.linear().transpose();
+      },
+      turn);
+  PolarizedLight turned_light = light;
+  for (Vector3d* each : {&turned_light.direction, &turned_light.right, &turned_light.up, &turned_light.start})
+    *each = turn.linear() * *each;
+  EXPECT_LT(distance(unitary_of(turned_field, turned_light), expected), 1e-5);
+
+  // Light back: the transpose, in axes of which u is turned about.
+  PolarizedLight back = light;
+  back.direction = -light.direction;
+  back.right = -light.right;
+  back.start = -light.start;
+  EXPECT_LT(distance(unitary_of(field, back), {expected.w(), expected.x(), -expected.y(), expected.z()}), 1e-5);
+}
+
+/// Samples of a pixel: its fringes' mean. Half a pixel in an obstacle is half as bright, its azimuth that of the rest.
+TEST(Polariscope, PixelsAreMeansOfTheirSamples) {
+  const TensorField field =
+      TensorField(cube_grid(Eigen::Vector3i::Constant(9), [](const Vector3d& p) { return plane_stress(2 + p.x(), 0); }),
+                  {Interpolation::cubic});
+  PolarizedLight light = light_along(-Vector3d::UnitZ());
+  light.strength = 1.3;
+  light.samples = 4;
+  Plate plate = plate_of(light, {1, 1}, 0.5);
+  double mean = 0;
+  for (int i = 0; i < 4; ++i) mean += std::cos(2 * light.strength * 2 * (2 + 0.5 * ((i + 0.5) / 4 - 0.5))) / 4;
+  EXPECT_NEAR(rotation_of(row_of(field, light, plate))(1, 1), mean, 1e-5);
+
+  Surfaces surfaces;
+  surfaces.obstacles.push_back(
+      box_mesh(Eigen::AlignedBox3d(Vector3d(0, -9, 3), Vector3d(9, 9, 4)), Eigen::Affine3d::Identity()));
+  const LightRow half = row_of(field, light, plate, 0, std::move(surfaces));
+  EXPECT_NEAR(half.lit[0], 0.5, 1e-6);
+  EXPECT_NEAR(half.points[0].length, 2, 1e-5);
+}
+
+}  // namespace
+}  // namespace tensorray
