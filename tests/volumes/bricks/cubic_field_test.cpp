@@ -1,23 +1,15 @@
 // A cubic field: what it reproduces, what it does at borders, and that all readers see the same.
 
-#include <cmath>
 #include <functional>
 #include <random>
-#include <vector>
 
-#include <gtest/gtest.h>
-
+#include "tests/names.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/tensor_grid.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 namespace {
-
-using Eigen::AlignedBox3i;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 constexpr Interpolant fading{Interpolation::cubic, Border::fade}, extending{Interpolation::cubic, Border::extend};
 constexpr double rounding = 4e-6;  // Of single precision, for values of 1: a coefficient is a sum of some 10 of them.
@@ -223,7 +215,6 @@ TEST(CubicField, TheBoundHoldsForValuesOfAnySize) {
   }
 }
 
-/// The bound of a brick holds everywhere in it.
 TEST(CubicField, NoDeviatorExceedsTheBoundOfItsBrick) {
   const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(17, 17, 17)), sheared(),
                                      [](auto& index) {
