@@ -4,14 +4,11 @@
 #include <sys/stat.h>
 
 #include "scenes/jobs/work_file.h"
-#include "tests/data_folder.h"
 #include "tests/program/divided_scenes.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
 
 class KeptWork : public Program {
  protected:
@@ -111,6 +108,14 @@ TEST_P(DividedWork, ThatIsKilledContinuesToTheSameFiles) {
   EXPECT_FALSE(has("a.png.checkpoint"));
 }
 
+TEST_P(DividedWork, IsTheSameOnAnyNumberOfThreads) {
+  make(GetParam());
+  for (const char* threads : {"1", "7"}) {
+    run_well(render("a", {"--threads", threads}));
+    expect_same("a");
+  }
+}
+
 TEST_P(DividedWork, OfShardsMergesToTheSameFiles) {
   make(GetParam());
   make_shards(3);
@@ -121,7 +126,9 @@ TEST_P(DividedWork, OfShardsMergesToTheSameFiles) {
 INSTANTIATE_TEST_SUITE_P(Methods, DividedWork,
                          testing::Values(lit_scene, plate_under_paths("mesh"), plate_scene(gaussian_photons, 100000),
                                          plate_scene(R"({"type": "photon_distribution", "density": {"error": 0.5}})"),
-                                         plate_scene(lens), plate_scene(stretch)));
+                                         plate_scene(lens),
+                                         plate_scene(R"({"type": "lens", "samples": 2, "mode": "scatter"})"),
+                                         plate_scene(stretch)));
 
 /// The first shard has it; others may take it from there, and merge does.
 TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
