@@ -29,7 +29,8 @@ inline void write_bytes(const std::filesystem::path& path, const std::string& by
 class Temporary : public std::filesystem::path {
  public:
   explicit Temporary(const std::string& name)
-      : std::filesystem::path(::testing::TempDir() + "/tensorray_" + std::to_string(::getpid()) + "_" + name) {}
+      : std::filesystem::path(std::filesystem::path(::testing::TempDir()) /
+                              ("tensorray_" + std::to_string(::getpid()) + "_" + name)) {}
   Temporary(const std::string& name, const std::string& bytes) : Temporary(name) { write_bytes(*this, bytes); }
   ~Temporary() {
     std::error_code ignored;

@@ -118,7 +118,6 @@ inline Matrix3d linear_tensor(const Vector3d& p) {
   return a + p.x() * b + p.y() * c + p.z() * d;
 }
 
-/// The rows side by side.
 inline Eigen::Matrix<double, 9, 1> flat(const Matrix3d& tensor) {
   const Matrix3d columns = tensor.transpose();
   return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(columns.data());

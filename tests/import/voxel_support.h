@@ -74,7 +74,6 @@ inline void refuses(Lattice (*open)(const std::filesystem::path&), const std::st
   expect_error([&] { tensors_of(open(file), TensorOrder::fsl); }, words);
 }
 
-/// A rotation without any symmetry.
 inline Eigen::Matrix3d rotation() {
   return Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
 }

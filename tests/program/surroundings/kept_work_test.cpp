@@ -126,9 +126,7 @@ TEST_P(DividedWork, OfShardsMergesToTheSameFiles) {
 INSTANTIATE_TEST_SUITE_P(Methods, DividedWork,
                          testing::Values(lit_scene, plate_under_paths("mesh"), plate_scene(gaussian_photons, 100000),
                                          plate_scene(R"({"type": "photon_distribution", "density": {"error": 0.5}})"),
-                                         plate_scene(lens),
-                                         plate_scene(R"({"type": "lens", "samples": 2, "mode": "scatter"})"),
-                                         plate_scene(stretch)));
+                                         plate_scene(lens), plate_scene(stretch)));
 
 /// The first shard has it; others may take it from there, and merge does.
 TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {

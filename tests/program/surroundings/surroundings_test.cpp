@@ -47,7 +47,7 @@ TEST_F(Limits, AreSaidInOneLine) {
       {without_threads(), {}, 1, "Resource temporarily unavailable"},
       {little, {"--set", "receiver.resolution=[16000,16000]"}, 2, "`/receiver/resolution` needs about"},
       {little,
-       {"--set", "receiver.resolution=[3000,3000]", "--set", "light.wavelengths.count=64", "--set",
+       {"--set", "receiver.resolution=[5000,5000]", "--set", "light.wavelengths.count=64", "--set",
         "output.spectral=a.exr"},
        2,
        "needs about"},

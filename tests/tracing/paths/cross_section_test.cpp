@@ -13,7 +13,6 @@ CrossSectionSettings radii(double least, double greatest = 1e300) {
   return settings;
 }
 
-/// A point of a way in the field.
 PathPoint point_of(const Vector3d& position, const Vector3d& direction, const Matrix3d& tensor) {
   PathPoint point;
   point.position = position;

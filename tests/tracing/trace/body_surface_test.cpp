@@ -132,7 +132,6 @@ TensorField body_field(const Body& body, const TensorFunction& T, int voxels, co
   return TensorField(grid, {between, Border::extend});
 }
 
-/// The rays that do not graze, and where they land.
 struct Truth {
   std::vector<BeamStart> starts;
   std::vector<Vector3d> landings;

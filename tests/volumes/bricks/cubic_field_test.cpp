@@ -14,7 +14,6 @@ namespace {
 constexpr Interpolant fading{Interpolation::cubic, Border::fade}, extending{Interpolation::cubic, Border::extend};
 constexpr double rounding = 4e-6;  // Of single precision, for values of 1: a coefficient is a sum of some 10 of them.
 
-/// A transform that turns, shears and scales.
 Eigen::Affine3d sheared() {
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
   to_world.linear() << 0.5, 0.1, 0, -0.2, 0.3, 0.05, 0, 0.1, 0.8;
