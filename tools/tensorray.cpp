@@ -12,9 +12,9 @@
 
 #include "base/process/child_program.h"
 #include "renderer/meshes/mesh_readers.h"
+#include "tools/command_line/imported_field.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
-#include "tools/command_line/imported_field.h"
 #include "tools/commands/commands.h"
 
 namespace {

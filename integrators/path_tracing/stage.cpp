@@ -53,8 +53,7 @@ ChannelTable<SurfacePixel> surface_channels(const SurfacePicture& picture, const
   ChannelTable<SurfacePixel> table{
       {{"R", "G", "B"}, [](Pixel pixel) { return pixel.color; }},
       {{"A"}, [](Pixel pixel) { return pixel.alpha; }},
-      {{"Z"},
-       [](Pixel pixel) { return pixel.state.depth.count > 0 ? pixel.state.depth.value[0] : nothing_depth; }},
+      {{"Z"}, [](Pixel pixel) { return pixel.state.depth.count > 0 ? pixel.state.depth.value[0] : nothing_depth; }},
       {{"normal.X", "normal.Y", "normal.Z"}, mean(&PixelState::normal)},
       {{"albedo.R", "albedo.G", "albedo.B"}, mean(&PixelState::albedo)},
       {{"path"}, [](Pixel pixel) { return pixel.state.path; }},

@@ -34,7 +34,8 @@ Spectrum blackbody(double kelvin);
 
 /// Reads a text file with two columns: wavelength (nm, increasing) and value (>= 0), separated by blanks, a comma or a
 /// semicolon. The decimal sign is a point, '#' starts a comment, and one heading line is allowed.
-/// @param any_sign  Whether values below 0 are allowed. @throw std::runtime_error naming the file, the line and the fix.
+/// @param any_sign  Whether values below 0 are allowed.
+/// @throw std::runtime_error naming the file, the line and the fix.
 Spectrum read_spectrum(const std::filesystem::path& path, bool any_sign = false);
 
 /// The CIE 1931 2° colour matching functions, interpolated linearly in a 1 nm table; zero outside 360–830 nm.

@@ -1,25 +1,14 @@
 // Bytes that broke a parser once, and some that are right (corpus/): none may end the process, or throw what is no
 // error of a reader. Beside each, what its cut-off beginnings give.
 
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <set>
-
-#include <gtest/gtest.h>
-
 #include "tests/data_folder.h"
+#include "tests/files.h"
 #include "tests/fuzz/targets.h"
 
 namespace tensorray::test {
 namespace {
 
 std::filesystem::path corpus() { return source_folder() / "tests" / "fuzz" / "corpus"; }
-
-std::string bytes_of(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 class Replay : public ::testing::TestWithParam<std::size_t> {};
 

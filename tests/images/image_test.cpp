@@ -1,24 +1,21 @@
 #include "renderer/images/image.h"
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <cstdint>
-#include <limits>
+#include <clocale>
+#include <cstdlib>
+#include <cstring>
 #include <stdexcept>
 #include <thread>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include <dlfcn.h>
 
+#include "renderer/film/spectral_image.h"
+#include "renderer/images/formats.h"
 #include "tests/images/picture_files.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 /// A picture that is smooth enough for JPEG.
 Image gradient() {
@@ -62,17 +59,6 @@ TEST_P(EveryEnding, KeepsDescriptions) {
   write_image(file.path(), gradient(), {{"ImageDescription", "seed 4711"}, {"Software", "tensorray 9.9"}});
   EXPECT_THAT(read_bytes(file.path()), HasSubstr("seed 4711"));
   EXPECT_THAT(read_bytes(file.path()), HasSubstr("tensorray 9.9"));
-}
-
-TEST_P(EveryEnding, FullDiskIsAnError) {
-  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no device that is always full";
-  // The disk becomes full when the file is closed (small picture) and while it is written.
-  for (const Image& image : {gradient(), noise_image(512, 512, {"R", "G", "B"})}) {
-    const Temporary file("full_disk" + GetParam());
-    std::filesystem::create_symlink("/dev/full", file.path());
-    EXPECT_EQ(message([&] { write_image(file.path(), image); }),
-              "cannot write " + file.path().string() + ": No space left on device");
-  }
 }
 
 TEST_P(EveryEnding, FilesThatWereCutOffAreRefused) {
@@ -156,6 +142,145 @@ TEST(ImageTest, UnknownEndingsAreRefused) {
             "cannot write /tmp/picture.bmpx: unknown picture ending \".bmpx\"; known: .exr, .png, .jpg, .jpeg, .tif, "
             ".tiff");
   EXPECT_THROW(write_image("/tmp/picture", gradient()), std::runtime_error);
+}
+
+/// A picture whose values are all different, and beside them those that are not numbers.
+Image picture(int width, int height, std::vector<std::string> channels) {
+  Image image(width, height, std::move(channels));
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = 0.37f * static_cast<float>(i) - 100;
+  const std::vector<float> odd{NAN, INFINITY, -INFINITY, -0.0f, 1e-42f};
+  for (std::size_t i = 0; i < std::min(odd.size(), image.pixels.size()); ++i) image.pixels[i] = odd[i];
+  return image;
+}
+
+std::string file_of(const Image& image, const ImageMetadata& metadata = {}) {
+  const std::vector<unsigned char> bytes = encode_exr(image, metadata, 1);
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST(ExrEncoderTest, PicturesAreReadBackBitForBit) {
+  // OpenImageIO gives R, G, B, A first, and the others in alphabetical order.
+  for (const std::vector<std::string>& channels :
+       {std::vector<std::string>{"Y"}, std::vector<std::string>{"R", "G", "B"},
+        std::vector<std::string>{"R", "G", "B", "A"},
+        std::vector<std::string>{"R", "G", "B", "A", "Z", "albedo.R", "normal.X", "sun.R"},
+        std::vector<std::string>{"R", "G", "B", "S0.423,750000nm", "S0.511,250000nm"}})
+    for (const auto& [width, height] : {std::pair(1, 1), std::pair(5, 16), std::pair(70, 37)}) {
+      const Image image = picture(width, height, channels);
+      const Temporary file("picture.exr", file_of(image));
+      const Image read = read_image(file.path());
+      ASSERT_EQ(read.channels, channels);
+      ASSERT_EQ(read.width, width);
+      ASSERT_EQ(read.height, height);
+      EXPECT_EQ(std::memcmp(read.pixels.data(), image.pixels.data(), sizeof(float) * image.pixels.size()), 0);
+    }
+}
+
+TEST(ExrEncoderTest, MetadataThatTheFormatHasNoPlaceForIsLeftOut) {
+  const Image image = picture(2, 2, {"R", "G", "B"});
+  const std::string plain = file_of(image);
+  for (const std::string name : {"", "channels", "dataWindow", "capDate", "type", "oiio:ColorSpace"})
+    EXPECT_TRUE(file_of(image, {{name, "text"}}) == plain) << name;
+}
+
+TEST(ExrEncoderTest, ChannelsOfTheSameNameAreAllWritten) {
+  const std::string name(300, 'n');
+  const Temporary file("names.exr", file_of(picture(3, 2, {"R", "G", "B", "R", "", name + "1", name + "2"})));
+  EXPECT_EQ(read_image(file.path()).channels,
+            (std::vector<std::string>{"R", "G", "B", "channel3", "channel4", "channel6", name.substr(0, 255)}));
+}
+
+TEST(ExrEncoderTest, PicturesThatAreTooLargeAreErrors) {
+  Image image = picture(1, 1, {"R"});
+  image.width = 1 << 30;
+  EXPECT_THAT(message([&] { encode_exr(image, {}, 1); }), HasSubstr("cannot be encoded as EXR: "));
+}
+
+/// In a process of its own, as other tests load it.
+TEST(ExrEncoderDeathTest, WritingDoesNotLoadOpenImageIO) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto is_loaded = [] { return dlopen("libtensorray_pictures.so", RTLD_LAZY | RTLD_NOLOAD) != nullptr; };
+  const auto write = [&](const std::string& ending) {
+    const Temporary file("alone" + ending);
+    prepare_images({file.path()});
+    write_image(file.path(), Image(3, 3, {"R", "G", "B"}));
+    return is_loaded();
+  };
+  EXPECT_EXIT(std::exit(write(".exr") || write(".png") || !write(".tif")), ::testing::ExitedWithCode(0), "");
+}
+
+Film counting_film(int width, int height, int channels) {
+  Film film(width, height, channels);
+  for (std::size_t i = 0; i < film.values.size(); ++i) film.values[i] = 0.25 * static_cast<double>(i);
+  return film;
+}
+
+TEST(LinearImageTest, EqualsTheSumOverBands) {
+  const Film film = counting_film(4, 3, 2);
+  std::vector<Band> bands(2);
+  bands[0].xyz = {1, 2, 3};
+  bands[1].xyz = {0, 0.5, 0};
+  Eigen::Matrix3d matrix;
+  matrix << 1, 0, 0, 0, 0, 1, 0, 2, 0;
+  const Image image = linear_image(film, bands, matrix);
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 4; ++x) {
+      const double first = 0.25 * (y * 4 + x), second = 0.25 * (12 + y * 4 + x);
+      EXPECT_FLOAT_EQ(image.pixel(x, y)[0], static_cast<float>(first));
+      EXPECT_FLOAT_EQ(image.pixel(x, y)[1], static_cast<float>(3 * first));
+      EXPECT_FLOAT_EQ(image.pixel(x, y)[2], static_cast<float>(2 * (2 * first + 0.5 * second)));
+    }
+}
+
+TEST(SpectralImageTest, FollowsTheLayout) {
+  const std::vector<Band> bands = make_bands(illuminant("D65"), 380, 730, 4);
+  const Film film = counting_film(4, 3, 4);
+  const SpectralImage spectral =
+      spectral_image(film, bands, SpectralQuantity::irradiance, 10, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(spectral.image.channels, (std::vector<std::string>{"R", "G", "B", "S0.423,750000nm", "S0.511,250000nm",
+                                                               "S0.598,750000nm", "S0.686,250000nm"}));
+  EXPECT_EQ(spectral.metadata.at("spectralLayoutVersion"), "1.0");
+  EXPECT_EQ(spectral.metadata.at("emissiveUnits"), "W.m^-2.nm^-1");
+  const SpectralImage radiance =
+      spectral_image(film, bands, SpectralQuantity::radiance, 10, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(radiance.metadata.at("emissiveUnits"), "W.m^-2.sr^-1.nm^-1");
+  EXPECT_EQ(radiance.image.pixels, spectral.image.pixels);
+  const Image rgb = linear_image(film, bands, Eigen::Matrix3d::Identity());
+  for (int k = 0; k < 4; ++k) {
+    const double expected = film.plane(k)[6] * 10 * bands[k].power / bands[k].width;
+    EXPECT_FLOAT_EQ(spectral.image.pixel(2, 1)[3 + k], static_cast<float>(expected));
+  }
+  for (int c = 0; c < 3; ++c) EXPECT_EQ(spectral.image.pixel(2, 1)[c], rgb.pixel(2, 1)[c]);
+}
+
+TEST(SpectralImageTest, NamesHaveSixDecimalsInEveryLocale) {
+  std::vector<Band> bands(3);
+  bands[0].wavelength = 380;
+  bands[1].wavelength = 1000 / 3.0;
+  bands[2].wavelength = 1250.0000004;
+  const char* const changed = std::setlocale(LC_NUMERIC, "de_DE.UTF-8");  // Null if the locale is not installed.
+  for (Band& band : bands) band.width = 1;
+  const Image image =
+      spectral_image(Film(1, 1, 3), bands, SpectralQuantity::irradiance, 1, Eigen::Matrix3d::Identity()).image;
+  std::setlocale(LC_NUMERIC, "C");
+  EXPECT_EQ(image.channels[3], "S0.380,000000nm") << (changed ? changed : "C");
+  EXPECT_EQ(image.channels[4], "S0.333,333333nm");
+  EXPECT_EQ(image.channels[5], "S0.1250,000000nm");
+}
+
+TEST(ImageDistance, IsAPartOfTheExactPicture) {
+  Image exact(2, 1, {"R"}), other(2, 1, {"R"});
+  exact.pixels = {3, 4};
+  other.pixels = {3, 5};
+  EXPECT_DOUBLE_EQ(relative_distance(other, exact), 0.2);
+  EXPECT_EQ(relative_distance(exact, exact), 0);
+  Image more(1, 1, {"R", "G", "B", "folds"}), less = more;
+  more.pixels = {1, 1, 1, 8};
+  less.pixels = {1, 1, 1, 2};
+  EXPECT_EQ(relative_distance(more, less), 0) << "only colours count";
+  EXPECT_EQ(relative_distance(exact, Image(2, 1, {"R"})), 0);
+  EXPECT_THROW(relative_distance(exact, Image(1, 2, {"R"})), std::invalid_argument);
+  EXPECT_THROW(relative_distance(exact, Image(2, 1, {"R", "G"})), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,17 +1,11 @@
 // What picture files say about their colours and their position, and what is made of it.
 
-#include <cmath>
 #include <cstdlib>
 #include <functional>
 #include <limits>
-#include <string>
 #include <tuple>
 #include <utility>
-#include <vector>
 
-#include <Eigen/LU>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <lcms2.h>
 
 #include "renderer/color/chromaticities.h"
@@ -23,11 +17,6 @@
 
 namespace tensorray {
 namespace {
-
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 /// The built-in config, whose working space is linear Rec. 709, whatever $OCIO is.
 const ColorManagement& color() {
@@ -385,18 +374,6 @@ TEST(PictureColors, NonFiniteTexelsAreCountedAndSaid) {
   light_of("a.exr", read_bytes(file.path()), "", &notes);
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_THAT(notes[0], HasSubstr("a.exr: 2 pixels have values that are not finite"));
-}
-
-TEST(PictureColors, LightWithoutAlphaIsKept) {
-  const Temporary file("glow.exr");
-  Image image(1, 1, {"R", "G", "B", "A"});
-  image.pixels = {1, 2, 3, 0};
-  write_image(file.path(), image, {{"chromaticities", "0.713 0.293 0.165 0.83 0.128 0.044 0.32168 0.33767"}});
-  const Texture texture(file.path(), color(), "", Wrap::clamp);
-  const Eigen::Vector4f light = texture.lookup({0.5, 0.5}, Eigen::Matrix2d::Identity());
-  EXPECT_EQ(light[3], 0);
-  // The published matrix from ACEScg.
-  EXPECT_LT((light.head<3>() - Eigen::Vector3f(0.21169f, 2.11969f, 3.17697f)).norm(), 2e-3);
 }
 
 /// An EXR of 2 x 2 pixels as luminance and chroma, which has one sample for all four.

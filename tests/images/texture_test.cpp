@@ -1,15 +1,7 @@
 #include "renderer/textures/texture.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <limits>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
 #include "renderer/color/file_colors.h"
@@ -18,12 +10,6 @@
 
 namespace tensorray {
 namespace {
-
-using Eigen::Matrix2d;
-using Eigen::Vector2d;
-using Eigen::Vector4f;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 const std::vector<Wrap> every_wrap{Wrap::none, Wrap::clamp, Wrap::repeat, Wrap::mirror};
 
@@ -174,7 +160,6 @@ TEST(TextureTest, EdgesAreAsSoftAsTheFootprint) {
   }
 }
 
-/// Texel x of a file that has one row.
 Vector4f texel_of(const std::filesystem::path& file, int x, const std::string& space = "") {
   const Texture texture(file, ColorManagement({}), space, Wrap::clamp);
   return texture.lookup({(x + 0.5) / texture.width(), 0.5}, Matrix2d::Zero());

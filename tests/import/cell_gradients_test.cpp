@@ -2,15 +2,11 @@
 // pieces, and of second order for a parabola at a wall.
 
 #include <array>
-#include <cmath>
 #include <functional>
 #include <map>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
 #include <vtkCellData.h>
 #include <vtkExodusIIWriter.h>
 #include <vtkUnsignedCharArray.h>

@@ -2,11 +2,6 @@
 /// @file tests/import/cell_types.h
 /// A cell of each three-dimensional type that VTK has, with a known volume.
 
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include <Eigen/Geometry>
 #include <vtkCell.h>
 #include <vtkCellTypes.h>
 #include <vtkDoubleArray.h>
@@ -16,6 +11,8 @@
 #include <vtkPoints.h>
 #include <vtkSmartPointer.h>
 #include <vtkUnstructuredGrid.h>
+
+#include "tests/names.h"
 
 namespace tensorray {
 
@@ -83,7 +80,6 @@ inline std::vector<Eigen::Vector3d> parametric_points(const CellKind& kind) {
   return result;
 }
 
-/// The volume between the points of parametric_points.
 inline double parametric_volume(const CellKind& kind) {
   switch (kind.type) {
     case VTK_TETRA:

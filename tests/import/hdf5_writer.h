@@ -2,12 +2,9 @@
 /// @file tests/import/hdf5_writer.h
 /// Writes HDF5 files for the tests of readers.
 
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 #include <vtk_hdf5.h>
+
+#include "tests/names.h"
 
 namespace tensorray {
 

@@ -2,7 +2,6 @@
 
 #include <functional>
 
-#include <gmock/gmock.h>
 #include <vtkDoubleArray.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
@@ -62,19 +61,6 @@ TEST(ImportFileTest, NumPyVoxelsAreWhereTheUserSays) {
   settings.sampling.bounds = Eigen::AlignedBox3d(Eigen::Vector3d(-1, 2, 5), Eigen::Vector3d(-0.75, 2.5, 5));
   EXPECT_EQ(import_tensors(settings, Progress(), report).active_voxels(), 6u);  // The bounds are in world space.
 }
-
-TEST(ImportFileTest, OnlyNumPyFilesTakeAnOrigin) {
-  const TemporaryFolder folder;
-  write_xml(*image(), folder / "a.vti");
-  ImportSettings settings;
-  settings.files = {folder / "a.vti"};
-  settings.origin = Eigen::Vector3d::Zero();
-  ImportReport report;
-  EXPECT_THROW(import_tensors(settings, Progress(), report), std::invalid_argument);
-}
-
-using testing::AllOf;
-using testing::HasSubstr;
 
 std::string joined(const std::vector<std::string>& lines) {
   std::string text;

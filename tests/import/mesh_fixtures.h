@@ -2,13 +2,9 @@
 /// @file tests/import/mesh_fixtures.h
 /// Meshes of a few cells with known shapes and values.
 
-#include <cmath>
 #include <functional>
-#include <string>
 #include <utility>
-#include <vector>
 
-#include <Eigen/Geometry>
 #include <vtkCellType.h>
 #include <vtkDataSet.h>
 #include <vtkDoubleArray.h>
@@ -20,13 +16,11 @@
 #include <vtkUnstructuredGrid.h>
 
 #include "base/constants.h"
+#include "tests/names.h"
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray::mesh_fixtures {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 using Map = std::function<Vector3d(const Vector3d&)>;
 using Grid = vtkSmartPointer<vtkUnstructuredGrid>;
 
@@ -98,15 +92,6 @@ inline Grid unit_cube(int cell_type, int n, const Map& map) {
   return grid;
 }
 
-/// A hollow cylinder about z: 1 <= r <= 2, |z| <= height / 2. Its grid is wrapped from one node line to itself, and the
-/// two faces at the seam have separate points.
-inline vtkSmartPointer<vtkStructuredGrid> hollow_cylinder(int around, double height) {
-  return curvilinear({around + 1, 5, 5}, [=](const Vector3d& p) {
-    const double angle = static_cast<double>(std::lround(p.x() * around) % around) * (2 * pi / around);
-    return Vector3d((1 + p.y()) * std::cos(angle), (1 + p.y()) * std::sin(angle), height * (p.z() - 0.5));
-  });
-}
-
 /// Adds a point array with the values that `value` returns at the points.
 template <int components>
 void add_array(vtkDataSet& mesh, const std::string& name,
@@ -133,13 +118,11 @@ inline Matrix3d linear_tensor(const Vector3d& p) {
   return a + p.x() * b + p.y() * c + p.z() * d;
 }
 
-/// The rows side by side.
 inline Eigen::Matrix<double, 9, 1> flat(const Matrix3d& tensor) {
   const Matrix3d columns = tensor.transpose();
   return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(columns.data());
 }
 
-/// Calls `visit(world position, tensor)` at each active voxel.
 inline void for_each_voxel(const TensorGrid& grid, const std::function<void(const Vector3d&, const Matrix3d&)>& visit) {
   for (const TensorBlock& block : grid.blocks)
     for (int offset = 0; offset < TensorBlock::voxels; ++offset)

@@ -3,9 +3,6 @@
 /// An OpenFOAM case as blockMesh and a solver would write it, in ASCII: 2 x 2 x 2 hexahedra of 1 x 0.5 x 2.
 
 #include <array>
-#include <filesystem>
-#include <string>
-#include <vector>
 
 #include "tests/import/mesh_files.h"
 

@@ -3,10 +3,7 @@
 /// Meshes with a velocity U at cells, and what is imported of its gradient.
 
 #include <functional>
-#include <string>
-#include <vector>
 
-#include <gtest/gtest.h>
 #include <vtkCellData.h>
 
 #include "base/process/progress.h"
@@ -53,7 +50,6 @@ inline TensorGrid gradients(const std::filesystem::path& file, double voxel, Tak
   return import_tensors(settings, Progress(), report);
 }
 
-/// The greatest difference from `expected` at all voxels.
 inline double error_in(const TensorGrid& grid, const std::function<Matrix3d(const Vector3d&)>& expected) {
   double worst = 0;
   std::size_t voxels = 0;

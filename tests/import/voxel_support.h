@@ -2,36 +2,19 @@
 /// @file tests/import/voxel_support.h
 /// Temporary files of voxels, the data sets, and checks of the results.
 
-#include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <functional>
 #include <stdexcept>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include <Eigen/Eigenvalues>
-#include <gtest/gtest.h>
 
 #include "tests/import/mesh_files.h"
 #include "tools/import/lattices/lattice.h"
 
 namespace tensorray::test {
 
-/// A path in the tests' temporary folder that no other process uses. The file is removed at the end.
-class TemporaryFile : public std::filesystem::path {
- public:
-  explicit TemporaryFile(const std::string& name) : path(testing::TempDir()) {
-    *this /= "tensorray_" + std::to_string(::getpid()) + "_" + name;
-  }
-  TemporaryFile(const std::string& name, const std::string& contents) : TemporaryFile(name) { write(contents); }
-  ~TemporaryFile() { std::filesystem::remove(*this); }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  void write(const std::string& contents) const { std::ofstream(*this, std::ios::binary) << contents; }
-};
+using TemporaryFile = Temporary;
 
 template <class Number>
 std::string bytes_of(const std::vector<Number>& numbers) {
@@ -54,7 +37,6 @@ inline TensorGrid tensors_of(const Lattice& lattice, std::optional<TensorOrder> 
   return tensors_of(lattice, order, report);
 }
 
-/// Calls `visit(index, tensor)` at the active voxels.
 inline void for_each_voxel(const TensorGrid& grid,
                            const std::function<void(const Eigen::Vector3i&, const Eigen::Matrix3d&)>& visit) {
   for (const TensorBlock& block : grid.blocks)
@@ -63,7 +45,6 @@ inline void for_each_voxel(const TensorGrid& grid,
         visit(block.origin + TensorBlock::position(offset), block.values[offset].cast<double>());
 }
 
-/// The least and the greatest eigenvalue of a symmetric field.
 inline std::pair<double, double> eigenvalues_of(const TensorGrid& grid) {
   std::pair<double, double> range{INFINITY, -INFINITY};
   for_each_voxel(grid, [&](const Eigen::Vector3i&, const Eigen::Matrix3d& tensor) {
@@ -93,7 +74,6 @@ inline void refuses(Lattice (*open)(const std::filesystem::path&), const std::st
   expect_error([&] { tensors_of(open(file), TensorOrder::fsl); }, words);
 }
 
-/// A rotation without any symmetry.
 inline Eigen::Matrix3d rotation() {
   return Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
 }

@@ -2,14 +2,9 @@
 /// @file tests/import/vtk_files.h
 /// Small data sets of every kind with a point array "tensor" and a cell array "rate", and files that contain them.
 
-#include <filesystem>
 #include <optional>
-#include <string>
 #include <utility>
-#include <vector>
 
-#include <Eigen/Core>
-#include <gtest/gtest.h>
 #include <vtkCellData.h>
 #include <vtkDataSetWriter.h>
 #include <vtkDoubleArray.h>
@@ -33,7 +28,6 @@ inline std::string read_error(const std::filesystem::path& path, std::optional<i
   return error_in_child(path, [&] { read_vtk_source(path, step); });
 }
 
-/// The value of component c at a position.
 inline double number(const double* x, int c) { return 3 * x[0] - 5 * x[1] + 7 * x[2] + c; }
 
 /// Adds the point array "tensor" with nine components and the cell array "rate" with three.

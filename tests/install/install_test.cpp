@@ -1,13 +1,9 @@
 // What `cmake --install` installs works where it is installed: programs, the C++ library, the Python package.
 
 #include <cstdlib>
-#include <filesystem>
-#include <string>
-
-#include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "tests/data_folder.h"
+#include "tests/files.h"
 
 namespace tensorray {
 namespace {
@@ -16,11 +12,7 @@ namespace fs = std::filesystem;
 
 class Install : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / ("tensorray_install_" + std::to_string(getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  void SetUp() override { fs::create_directories(folder_); }
 
   /// Runs a command of the shell in the test's folder, with `prefix` as the variable of that name.
   void run(const std::string& command) const {
@@ -35,7 +27,7 @@ class Install : public testing::Test {
   fs::path prefix() const { return folder_ / "prefix"; }
 
  private:
-  fs::path folder_;
+  const Temporary folder_{"install"};
 };
 
 TEST_F(Install, ProgramsRun) {

@@ -2,14 +2,11 @@
 /// @file tests/program/import_support.h
 /// Imports files as a user does, and writes files to import. Their field consists of lumps without any symmetry.
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <functional>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -19,9 +16,6 @@
 
 namespace tensorray::test {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 using Arguments = std::vector<std::string>;
 using nlohmann::json;
 

@@ -2,33 +2,31 @@
 /// @file tests/program/support.h
 /// Runs the whole program, as a user does.
 
-#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <string>
 #include <thread>
-#include <vector>
 
 #include <fcntl.h>
 #include <fmt/core.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "tests/data_folder.h"
+#include "tests/files.h"
 #include "tests/scenes/small_scene.h"
+
+namespace tensorray {
+namespace test {}
+using namespace test;
+}  // namespace tensorray
 
 namespace tensorray::test {
 
-inline std::string read_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+inline std::string read_file(const std::filesystem::path& path) { return bytes_of(path); }
 
 struct Outcome {
   int status = -1;  ///< Exit status; 128 + the number of the signal if a signal ended the program.
@@ -38,14 +36,7 @@ struct Outcome {
 /// Makes a folder for each test, and removes it after the test.
 class Program : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    std::string name = test->name();
-    std::replace(name.begin(), name.end(), '/', '_');
-    folder_ = std::filesystem::path(::testing::TempDir()) / ("tensorray_" + std::to_string(getpid()) + "_" + name);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
+  Program() { std::filesystem::create_directories(folder_); }
 
   std::filesystem::path in_folder(const std::string& name) const { return folder_ / name; }
 
@@ -59,7 +50,7 @@ class Program : public ::testing::Test {
   pid_t start_in(const std::string& shell, const std::vector<std::string>& arguments) const {
     const pid_t child = fork();
     if (child != 0) return child;
-    if (chdir(folder_.c_str()) != 0) _exit(126);
+    if (chdir(in_folder("").c_str()) != 0) _exit(126);
     const int out = open("stdout", O_WRONLY | O_CREAT | O_TRUNC, 0600);
     const int error = open("stderr", O_WRONLY | O_CREAT | O_TRUNC, 0600);
     dup2(out, 1);
@@ -99,7 +90,7 @@ class Program : public ::testing::Test {
 
   /// Runs a script of tools/ with the test's folder as working folder. @param variables  "NAME=VALUE ..." for it.
   Outcome run_script(const std::string& script, const std::string& arguments, const std::string& variables = "") const {
-    const std::string command = fmt::format("cd '{}' && {} '{}' {} >stdout 2>stderr", folder_.string(), variables,
+    const std::string command = fmt::format("cd '{}' && {} '{}' {} >stdout 2>stderr", in_folder("").string(), variables,
                                             (source_folder() / "tools" / script).string(), arguments);
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(in_folder("stdout")),
@@ -133,7 +124,7 @@ class Program : public ::testing::Test {
   /// Names of the files in the folder, except those that `run` makes.
   std::vector<std::string> files() const {
     std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+    for (const auto& entry : std::filesystem::directory_iterator(in_folder(""))) {
       const std::string name = entry.path().filename().string();
       if (name != "stdout" && name != "stderr") names.push_back(name);
     }
@@ -142,7 +133,7 @@ class Program : public ::testing::Test {
   }
 
  private:
-  std::filesystem::path folder_;
+  const Temporary folder_{"program"};
 };
 
 }  // namespace tensorray::test

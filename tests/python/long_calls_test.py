@@ -18,6 +18,14 @@ SCENE = {"light": {"photons": 20000, "wavelengths": {"count": 8}}, "receiver": {
 LONG = {**SCENE, "light": {"photons": 1e9}}  # Hours.
 
 
+def in_threads(count, work):
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
 class LongCallsTest(unittest.TestCase):
     def test_several_threads_render_at_once(self):
         field = tr.make("vortex", resolution=24)
@@ -27,11 +35,7 @@ class LongCallsTest(unittest.TestCase):
         def work(seed):
             results[seed] = tr.render(SCENE, field=field, seed=seed, threads=1 + seed % 2).linear
 
-        threads = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        in_threads(4, work)
         for result, wanted in zip(results, expected):
             np.testing.assert_array_equal(result, wanted)
 
@@ -43,11 +47,7 @@ class LongCallsTest(unittest.TestCase):
             mode = ("raw", "absolute")[i % 2]
             ends[i] = tr.trace(field, [10.0, 11.0, 30.0], [0, 0, -1], 0.1, eigenvalues=mode).positions
 
-        threads = [threading.Thread(target=work, args=(i,)) for i in range(6)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        in_threads(6, work)
         for i in range(2, 6):
             np.testing.assert_array_equal(ends[i], ends[i % 2])
 

@@ -1,12 +1,9 @@
 // The Python package, in the Python that it was built for. The tests themselves are the *_test.py in this folder.
 
 #include <cstdlib>
-#include <filesystem>
-#include <string>
-
-#include <gtest/gtest.h>
 
 #include "tests/data_folder.h"
+#include "tests/names.h"
 
 namespace tensorray {
 namespace {

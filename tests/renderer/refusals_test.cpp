@@ -1,12 +1,7 @@
 // What the functions of all rooms refuse, with what their errors say of it.
 
-#include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "renderer/camera/camera.h"
 #include "renderer/charts/color_bar.h"
@@ -22,12 +17,10 @@
 #include "renderer/surfaces/tube_mesh.h"
 #include "renderer/textures/environment_map.h"
 #include "renderer/textures/test_images.h"
+#include "tests/names.h"
 
 namespace tensorray {
 namespace {
-
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 
 const double nan_value = std::nan(""), infinite = std::numeric_limits<double>::infinity();
 

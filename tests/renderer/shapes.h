@@ -2,15 +2,11 @@
 /// @file tests/renderer/shapes.h
 /// Surfaces, and what is known of them in closed form.
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
-#include <vector>
-
-#include <Eigen/Geometry>
 
 #include "base/constants.h"
 #include "renderer/surfaces/surface.h"
+#include "tests/names.h"
 
 namespace tensorray {
 

@@ -2,13 +2,9 @@
 /// @file tests/renderer/statistics.h
 /// Hypothesis tests, and means with standard errors.
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <vector>
 
-#include <Eigen/Core>
-#include <gtest/gtest.h>
+#include "tests/names.h"
 
 namespace tensorray {
 

@@ -2,17 +2,12 @@
 /// @file tests/scenes/read_scene_fixture.h
 /// Scene files in a folder of their own, and the errors that they give.
 
-#include <filesystem>
 #include <fstream>
 #include <map>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "base/files/temporary_folder.h"
 #include "integrators/methods/read_scene.h"
+#include "tests/names.h"
 
 namespace tensorray::test {
 

@@ -1,17 +1,16 @@
 #include "integrators/methods/read_scene.h"
 
-#include <filesystem>
-#include <string>
-#include <vector>
+#include <cstdlib>
+#include <fstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <sys/resource.h>
+#include <sys/stat.h>
 
 #include "integrators/lens/lens_method.h"
 #include "integrators/path_tracing/path_tracing_method.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
+#include "scenes/description/check_scene.h"
+#include "tests/files.h"
 #include "tests/scenes/read_scene_fixture.h"
 
 namespace tensorray {
@@ -19,9 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace test;
-using ::testing::AllOf;
-using ::testing::EndsWith;
-using ::testing::HasSubstr;
 
 TEST_F(ReadScene, ReadsEveryKindOfValue) {
   const SceneDescription scene = read({}, R"({
@@ -224,27 +220,6 @@ TEST_F(ReadScene, ChecksAcrossKeys) {
   EXPECT_NO_THROW(read({"light.up=[0,0,1]"})) << "up along the light has a fallback";
 }
 
-/// What outputs need: planes of all bands only where a spectral picture is wanted.
-TEST_F(ReadScene, PicturesMustFitInMemory) {
-#ifdef TENSORRAY_SANITIZED
-  GTEST_SKIP() << "the shadow memory of sanitizers is more than this limit";
-#endif
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_DATA, &before), 0);
-  const rlimit lower{rlim_t{8} << 30, before.rlim_max};
-  ASSERT_EQ(setrlimit(RLIMIT_DATA, &lower), 0);
-  const std::string plate = "receiver.resolution=[8000,8000]", camera = "camera.resolution=[3000,3000]";
-  EXPECT_NO_THROW(read({plate, "output.image=a.png", "light.wavelengths.count=256"}));
-  EXPECT_THAT(error({plate, "output.spectral=a.exr", "light.wavelengths.count=64"}),
-              AllOf(HasSubstr("`/receiver/resolution` needs about"), HasSubstr("what `ulimit -d` leaves")));
-  EXPECT_THAT(error({plate, "integrator.type=lens"}), HasSubstr("`/receiver/resolution` needs about"));
-  EXPECT_NO_THROW(read({"receiver.resolution=[4000,4000]", "integrator.type=lens"}));
-  EXPECT_NO_THROW(read({camera, "integrator.type=path_tracing"}));
-  EXPECT_THAT(error({camera, "integrator.type=path_tracing", "integrator.bands=64"}),
-              HasSubstr("`/camera/resolution` needs about"));
-  setrlimit(RLIMIT_DATA, &before);
-}
-
 TEST_F(ReadScene, Spectra) {
   for (const char* name : {"D65", "E", "A"})
     EXPECT_EQ(std::get<Illuminant>(read({std::string("light.spectrum=") + name}).light.spectrum).name, name);
@@ -294,6 +269,106 @@ TEST_F(ReadScene, SyntaxErrorsHaveAPosition) {
   EXPECT_THAT(error({}, "{\"seed\": 1} x"), HasSubstr("line 1, column 13: "));
   EXPECT_THAT(error({}, "{\"seed\": 1e999}"), HasSubstr("number overflow"));
   EXPECT_THAT(error({}, "{\"seed\": 1, \"seed\": 2}"), HasSubstr("key `seed` is given twice"));
+}
+
+// The files that scenes name, read and write.
+/// A path is any bytes. The scene's text, which is kept in files and read again, has them as UTF-8.
+TEST_F(ReadScene, PathsOfAnyBytesComeBack) {
+  const std::string name = "u\xff\xc3(.vdb";
+  const SceneDescription scene = read({"field.file=" + name});
+  EXPECT_EQ(scene.field.file, folder_ / name);
+  const SceneDescription again = read_scene_json(parse_value(scene.text), scene.path);
+  EXPECT_EQ(again.field.file, folder_ / name);
+  const SceneDescription config = read({"output.ocio=/tmp/" + name});
+  EXPECT_EQ(config.output.ocio, "/tmp/" + name);
+  EXPECT_EQ(read_scene_json(parse_value(config.text), config.path).output.ocio, "/tmp/" + name);
+  const SceneDescription alone = read_scene("/tmp/" + name, {});
+  EXPECT_EQ(alone.field.file, "/tmp/" + name);
+}
+
+TEST_F(ReadScene, OutputsNeverOverwriteEachOtherOrAnInput) {
+  EXPECT_THAT(error({"output.exr=a.exr", "output.spectral=./x/../a.exr"}), HasSubstr("same file as `/output/exr`"));
+  EXPECT_THAT(error({"output.photons=a.vdb"}),
+              HasSubstr("`/output/photons` (" + (folder_ / "a.vdb").string() + ") is the same file as `/field/file`"));
+  EXPECT_NO_THROW(read({"output.exr=a.exr", "output.spectral=b/a.exr", "output.photons=b.vdb"}));
+}
+
+TEST_F(ReadScene, OutputsOfTheCommandLineTakeThePlaceOfTheScenes) {
+  const auto files_of = [this](const std::vector<fs::path>& outputs, const Overrides& overrides = {}) {
+    return read_scene(file(smallest), {overrides, outputs}).output.files;
+  };
+  EXPECT_EQ(files_of({"/a/b.jpg", "/a/c.spectral.exr"}, {"output.exr=d.exr"}),
+            (Files{{"image", "/a/b.jpg"}, {"spectral", "/a/c.spectral.exr"}}));
+  EXPECT_EQ(files_of({"/a.vdb", "/a.fluence.vdb"}), (Files{{"photons", "/a.vdb"}, {"fluence", "/a.fluence.vdb"}}));
+  EXPECT_EQ(files_of({"/a.vtp"}), (Files{{"photons", "/a.vtp"}}));
+  EXPECT_EQ(files_of({"/a.vtp"}, {"integrator.type=path_tracing"}), (Files{{"paths", "/a.vtp"}}));
+  EXPECT_EQ(files_of({"/a.vdb"}, {"integrator.type=stretch"}), (Files{{"stretch", "/a.vdb"}}));
+  EXPECT_EQ(files_of({"a.png"}), (Files{{"image", fs::absolute("a.png")}}));
+  const auto refusal = [&](const std::vector<fs::path>& outputs, const Overrides& overrides = {}) {
+    return message([&] { files_of(outputs, overrides); });
+  };
+  EXPECT_THAT(refusal({"a.png", "b.jpg"}), HasSubstr("one kind"));
+  EXPECT_THAT(refusal({"a.gif"}), HasSubstr(".png, .jpg"));
+  EXPECT_THAT(refusal({"a.vdb"}, {"integrator.type=lens"}), HasSubstr("lens makes no photons"));
+}
+
+/// input_files lists every key that names a file, and an output is refused under any name of the same file.
+TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
+  for (const char* name : {"body.ply", "cut.ply", "photo.png", "sky.exr", "lamp.txt", "config.ocio", "seeds.txt"})
+    std::ofstream(folder_ / name) << name;
+  fs::create_directories(folder_ / "folder");
+  const Overrides inputs{"obstacles=[{\"file\":\"body.ply\"}]",
+                         "field.bounds=cut.ply",
+                         "integrator.image=photo.png",
+                         "lights=[{\"kind\":\"environment\",\"file\":\"sky.exr\"}]",
+                         "light.spectrum=lamp.txt",
+                         "output.ocio=config.ocio",
+                         "integrator.seeds={\"kind\":\"file\",\"file\":\"seeds.txt\"}"};
+  unsetenv("OCIO");
+  const SceneDescription scene = read(inputs);
+  for (const NamedFile& input : input_files(scene)) {
+    if (!fs::exists(input.path)) continue;
+    const fs::path hard = folder_ / "hard_link", soft = folder_ / "soft_link";
+    fs::remove(hard);
+    fs::remove(soft);
+    fs::create_hard_link(input.path, hard);
+    fs::create_symlink(input.path.filename(), soft);
+    for (const fs::path& output : {input.path, folder_ / "folder/.." / input.path.filename(), hard, soft})
+      EXPECT_THROW(check_files(scene, {{output, "--stats"}}), SceneError) << input.name << " by " << output;
+  }
+  EXPECT_EQ(input_files(scene).size(), 10u) << "a new kind of input belongs into this test";
+  EXPECT_NO_THROW(check_files(scene, {{folder_ / "new.json", "--stats"}}));
+  EXPECT_NO_THROW(check_files(scene, {{"/dev/stdout", "--stats"}}));
+
+  // To open a pipe may take for ever. Only the scene itself may come through one.
+  for (const NamedFile& input : input_files(scene)) {
+    if (!fs::exists(input.path)) continue;
+    const fs::path aside = folder_ / "aside";
+    fs::rename(input.path, aside);
+    ASSERT_EQ(mkfifo(input.path.c_str(), 0600), 0);
+    std::string refusal;
+    try {
+      check_files(scene, {});
+    } catch (const SceneError& error) {
+      refusal = error.what();
+    }
+    EXPECT_EQ(refusal.find("is a pipe or a device") != std::string::npos, input.path != scene.path) << input.name;
+    fs::remove(input.path);
+    fs::rename(aside, input.path);
+  }
+}
+
+/// A config that is not read is no input, which its file would have to exist for.
+TEST_F(ReadScene, TheConfigOfTheEnvironmentIsAnInputWhereItIsRead) {
+  setenv("OCIO", "/no/such.ocio", 1);
+  const auto reads_it = [&](const Overrides& overrides) {
+    const std::vector<NamedFile> files = input_files(read(overrides));
+    return std::any_of(files.begin(), files.end(), [](const NamedFile& file) { return file.path == "/no/such.ocio"; });
+  };
+  EXPECT_TRUE(reads_it({}));
+  for (const char* other : {"output.ocio=built-in", "output.ocio=own.ocio", "output.ocio=ocio://default"})
+    EXPECT_FALSE(reads_it({other})) << other;
+  unsetenv("OCIO");
 }
 
 }  // namespace

@@ -1,13 +1,10 @@
 // The schema and the reader use one table of keys. These tests give the values that the schema names to the reader, and
 // check that both accept and refuse the same.
 
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "integrators/methods/read_scene.h"
+#include "tests/names.h"
 
 namespace tensorray {
 namespace {

@@ -1,11 +1,11 @@
 // Which sources may use which libraries, and other invariants of ARCHITECTURE.md.
 
+#include <cctype>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <regex>
 #include <set>
-#include <string>
-
-#include <gtest/gtest.h>
 
 #include "tests/structure/sources.h"
 
@@ -13,6 +13,8 @@ namespace tensorray {
 namespace {
 
 using test::Line, test::lines_of, test::top_folders;
+using test::lines_of, test::top_folders;
+namespace fs = std::filesystem;
 
 /// The benchmark may include these libraries, because it compares with their samplers.
 bool is_benchmark(const Line& line) { return line.is_under("tools/benchmark"); }
@@ -107,6 +109,140 @@ TEST(Structure, WhatComputesNeverSeesAScene) {
     EXPECT_FALSE(std::regex_search(line.text, includes)) << line.file << ": " << line.text;
   }
   EXPECT_GT(found, 1000u);
+}
+
+// Functions are defined in the room of their declaration.
+/// A file without comments, text and directives.
+std::string code_of(const std::string& file) {
+  const std::string text = bytes_of(test::source_folder() / file);
+  std::string code;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto skip_to = [&](const std::string& end) {
+      const std::size_t found = text.find(end, i + 1);
+      i = found == std::string::npos ? text.size() : found + end.size() - 1;
+    };
+    if (text.compare(i, 2, "//") == 0 || (text[i] == '#' && (i == 0 || text[i - 1] == '\n'))) {
+      skip_to("\n");
+      code += '\n';
+    } else if (text.compare(i, 3, "R\"(") == 0) {
+      skip_to(")\"");
+    } else if (text[i] == '"' || (text[i] == '\'' && !std::isalnum(static_cast<unsigned char>(text[i - 1])))) {
+      for (const char quote = text[i]; ++i < text.size() && text[i] != quote;)
+        if (text[i] == '\\') ++i;
+    } else {
+      code += text[i];
+    }
+  }
+  return code;
+}
+
+/// The index behind the bracket that closes the one before `begin`.
+std::size_t end_of_bracket(const std::string& code, std::size_t begin) {
+  int depth = 1;
+  for (; begin < code.size() && depth > 0; ++begin) {
+    if (code[begin] == '(') ++depth;
+    if (code[begin] == ')') --depth;
+  }
+  return begin;
+}
+
+std::set<std::string> files() {
+  std::set<std::string> result;
+  for (const std::string& top : top_folders())
+    for (const test::Line& line : lines_of(top)) result.insert(line.file);
+  return result;
+}
+
+/// Code without what stands between two texts, every time.
+std::string without(std::string code, const std::string& begin, const std::string& end) {
+  for (std::size_t first = 0; (first = code.find(begin, first)) != std::string::npos;) {
+    const std::size_t last = code.find(end, first);
+    code.erase(first, last == std::string::npos ? last : last + end.size() - first);
+  }
+  return code;
+}
+
+/// The functions outside of classes behind whose parameters `mark` stands: ';' of a declaration, '{' of a definition.
+std::set<std::string> free_functions(const std::string& code, char mark) {
+  static const std::regex begin(
+      R"(\n(?!using|return|static|#|namespace|struct|class)[\w:][\w:<>,&* ]*[\w>&*] ?[&*]*\b(\w+)\()");
+  std::set<std::string> names;
+  for (auto match = std::sregex_iterator(code.begin(), code.end(), begin); match != std::sregex_iterator(); ++match) {
+    const auto first = static_cast<std::size_t>(match->position() + match->length());
+    const std::size_t end = code.find_first_not_of(" \n", end_of_bracket(code, first));
+    if (end != std::string::npos && code[end] == mark) names.insert((*match)[1]);
+  }
+  return names;
+}
+
+std::string folder_of(const std::string& file) { return file.substr(0, file.rfind('/')); }
+
+/// Otherwise two rooms may need each other without an include that shows it: only the linker would see the circle.
+TEST(Structure, FunctionsAreDefinedInTheRoomThatDeclaresThem) {
+  std::map<std::string, std::set<std::string>> rooms;
+  for (const std::string& file : files())
+    if (file.substr(file.rfind('.')) == ".h")
+      for (const std::string& name : free_functions(code_of(file), ';')) rooms[name].insert(folder_of(file));
+  for (const std::string& file : files()) {
+    if (file.substr(file.rfind('.')) == ".h") continue;
+    const std::string of_targets = without(code_of(file), "HWY_BEFORE_NAMESPACE", "HWY_AFTER_NAMESPACE");
+    for (const std::string& name : free_functions(without(of_targets, "namespace {\n", "\n}  \n"), '{'))
+      EXPECT_TRUE(!rooms.count(name) || rooms[name].count(folder_of(file)))
+          << file << " defines " << name << ", which a header of another room declares";
+  }
+  EXPECT_TRUE(rooms.at("trace").count("tracing/trace"));
+}
+
+// The budgets of lines in CONTRIBUTING.md.
+/// The lines of all sources by folder, for every folder above a source; "" is the whole project.
+std::map<std::string, long> lines_by_folder() {
+  const std::set<std::string> endings{".h", ".cpp", ".py", ".ts", ".css", ".html"};
+  std::map<std::string, long> lines;
+  for (const fs::path& path : test::files_of_project()) {
+    if (!endings.count(path.extension().string())) continue;
+    std::ifstream file(path);
+    const long count = std::count(std::istreambuf_iterator<char>(file), {}, '\n');
+    fs::path folder = fs::relative(path, test::source_folder());
+    do {
+      folder = folder.parent_path();
+      lines[folder.string()] += count;
+    } while (!folder.empty());
+  }
+  return lines;
+}
+
+/// The rows "| `folder` | 1,234 |" of the section "Lines".
+std::map<std::string, long> budgets() {
+  std::ifstream page(test::source_folder() / "CONTRIBUTING.md");
+  const std::regex row(R"(\| `([\w/]+)` \| ([\d,]+) \|.*)");
+  std::map<std::string, long> found;
+  bool is_section = false;
+  for (std::string line; std::getline(page, line);) {
+    if (line.rfind("## ", 0) == 0) is_section = line == "## Lines";
+    std::smatch match;
+    if (is_section && std::regex_match(line, match, row))
+      found[match[1]] = std::stol(std::regex_replace(match[2].str(), std::regex(","), ""));
+  }
+  return found;
+}
+
+std::string with_commas(long number) {
+  std::string text = std::to_string(number);
+  for (auto at = static_cast<int>(text.size()) - 3; at > 0; at -= 3) text.insert(static_cast<std::size_t>(at), ",");
+  return text;
+}
+
+TEST(Budgets, AreKept) {
+  const std::map<std::string, long> all = budgets();
+  std::map<std::string, long> lines = lines_by_folder();
+  for (const auto& [folder, budget] : all)
+    EXPECT_LE(lines[folder], budget) << folder << " has " << with_commas(lines[folder]) << " lines, its budget is "
+                                     << with_commas(budget) << ": CONTRIBUTING.md, Lines";
+  for (const auto& [folder, count] : lines) {
+    const bool is_top = !folder.empty() && folder.find('/') == std::string::npos;
+    EXPECT_TRUE(!is_top || all.count(folder))
+        << folder << " has " << with_commas(count) << " lines and no budget: CONTRIBUTING.md, Lines";
+  }
 }
 
 }  // namespace

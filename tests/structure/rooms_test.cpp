@@ -1,15 +1,9 @@
 // The includes that are allowed between folders of sources ("rooms"): one line for each room.
 
-#include <algorithm>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <regex>
 #include <set>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "tests/structure/sources.h"
 

@@ -2,15 +2,11 @@
 /// @file tests/structure/sources.h
 /// The files of the project, and its sources as lines of text, for tests of rules about them.
 
-#include <filesystem>
 #include <fstream>
 #include <set>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "tests/data_folder.h"
+#include "tests/files.h"
 
 namespace tensorray::test {
 

@@ -2,10 +2,8 @@
 /// @file tests/tracing/flow_support.h
 /// Flow maps of fields in a cube, and their light.
 
-#include <cmath>
 #include <numeric>
 #include <utility>
-#include <vector>
 
 #include "tests/tracing/support.h"
 #include "tracing/flow/flow_map.h"

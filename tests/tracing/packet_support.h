@@ -2,16 +2,10 @@
 /// @file tests/tracing/packet_support.h
 /// Random fields and rays, and functions that compare packets with the reference.
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <random>
 #include <sstream>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "base/constants.h"
 #include "tests/tracing/support.h"
@@ -122,7 +116,6 @@ inline TensorField lattice_field(const Eigen::AlignedBox3i& box, const Lattice& 
   return cubic_field(lattice_grid(box, lattice, tensor));
 }
 
-/// Removes a fraction of the blocks.
 inline TensorGrid without_blocks(TensorGrid grid, double fraction, unsigned seed) {
   Numbers numbers(seed);
   const auto taken = [&](const TensorBlock&) { return numbers.next() < fraction; };
@@ -179,12 +172,10 @@ inline std::vector<double> wavelengths(double kick) { return {0.2 * kick, -0.4 *
 /// Extents that begin and end anywhere in a brick.
 inline Eigen::AlignedBox3i odd_box() { return index_box({-13, 5, -30}, {27, 34, 41}); }
 
-/// Distance in mean edges of a voxel.
 inline double distance_in_voxels(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return (a - b).norm() / mean_edge;
 }
 
-/// A scene that rays are traced through.
 struct Scene {
   std::string name;
   TensorField field;

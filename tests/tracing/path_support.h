@@ -3,11 +3,8 @@
 /// Paths that files must keep, and comparisons of paths.
 
 #include <random>
-#include <string>
-#include <vector>
 
-#include <gtest/gtest.h>
-
+#include "tests/names.h"
 #include "tracing/paths/paths.h"
 
 namespace tensorray {

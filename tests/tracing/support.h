@@ -4,13 +4,16 @@
 
 #include <functional>
 
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
 #include "renderer/meshes/mesh.h"
+#include "tests/names.h"
 #include "tracing/bending/bending.h"
 #include "tracing/trace/trace.h"
 #include "volumes/bricks/tensor_field.h"
+
+namespace tensorray {
+namespace test {}
+using namespace test;
+}  // namespace tensorray
 
 namespace tensorray::test {
 

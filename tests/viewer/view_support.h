@@ -6,12 +6,9 @@
 #include <cstring>
 #include <fstream>
 #include <mutex>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "base/files/temporary_folder.h"
+#include "tests/names.h"
 #include "tools/viewer/pages.h"
 
 namespace tensorray::test {
@@ -48,7 +45,6 @@ inline Received received(const PageMessage& message) {
   return {Json::parse(message.data.substr(4, size)), message.data.substr(4 + size)};
 }
 
-/// Collects what a page is sent.
 class Mailbox {
  public:
   Pages::Send sender() {

@@ -2,39 +2,12 @@
 /// @file tests/volumes/file_support.h
 /// Temporary files, a tensor grid with everything that files must keep, and grids that OpenVDB itself writes.
 
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <string>
-
-#include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
-#include <unistd.h>
 
-#include "tests/volumes/file_size_limit.h"
+#include "tests/files.h"
 #include "tests/volumes/grid_support.h"
 
 namespace tensorray {
-
-/// A path in the tests' temporary folder that no other process uses; the destructor removes the file.
-class Temporary : public std::filesystem::path {
- public:
-  explicit Temporary(const std::string& name) : path(testing::TempDir()) {
-    *this /= "tensorray_" + std::to_string(::getpid()) + "_" + name;
-  }
-  ~Temporary() { std::filesystem::remove_all(*this); }
-  Temporary(const Temporary&) = delete;
-  Temporary& operator=(const Temporary&) = delete;
-};
-
-inline std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-inline void write_bytes(const std::filesystem::path& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary) << bytes;
-}
 
 /// Non-symmetric values, with holes, negative indices, and a sheared transform.
 inline TensorGrid sparse_grid() {

@@ -2,11 +2,7 @@
 /// @file tests/volumes/grid_support.h
 /// Grids of tensors, and what is in them.
 
-#include <cmath>
-
-#include <Eigen/Core>
-#include <gtest/gtest.h>
-
+#include "tests/names.h"
 #include "volumes/grids/tensor_grid.h"
 #include "volumes/tensors/eigenvalues.h"
 
@@ -20,7 +16,6 @@ inline Eigen::Matrix3d waves(const Eigen::Vector3i& i) {
   });
 }
 
-/// Calls `visit(index, tensor)` at each active voxel.
 template <class Visit>
 void for_each_active(const TensorGrid& grid, const Visit& visit) {
   for (const TensorBlock& block : grid.blocks)

@@ -2,13 +2,10 @@
 /// @file tests/volumes/point_support.h
 /// Points that files must keep, for the tests of their formats.
 
-#include <algorithm>
 #include <random>
 #include <tuple>
-#include <vector>
 
-#include <gtest/gtest.h>
-
+#include "tests/files.h"
 #include "volumes/points/point_files.h"
 
 namespace tensorray {
@@ -26,6 +23,21 @@ inline PointCloud cloud_of(std::size_t count, float thickness) {
   }
   cloud.metadata = {{"seed", "7"}, {"scene", "<a> & \"b\"\nc"}};
   return cloud;
+}
+
+/// Writes points to a disk that becomes full anywhere in the file.
+inline void expect_full_disk_is_noticed(const std::string& name) {
+  const PointCloud cloud = cloud_of(20000, 0.5f);
+  const Temporary path(name);
+  write_points(path, cloud);
+  const auto size = file_size(path);
+  for (const auto limit : {std::uintmax_t{0}, size / 50, size / 3, size / 2, size * 9 / 10, size - 1}) {
+    remove(path);
+    const FileSizeLimit limited(limit);
+    testing::internal::CaptureStderr();
+    EXPECT_NE(message([&] { write_points(path, cloud); }).find(path.string()), std::string::npos) << limit;
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  }
 }
 
 /// Power, position, wavelength and direction of a point. Powers increase with the index in the cloud.

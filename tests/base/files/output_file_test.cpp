@@ -1,54 +1,28 @@
 #include "base/files/output_file.h"
 
-#include <algorithm>
+#include <cerrno>
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include <fcntl.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include <fmt/core.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/files/descriptor.h"
+#include "base/files/temporary_folder.h"
+#include "base/text/content_hash.h"
+#include "tests/files.h"
 
 namespace tensorray {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
-
-std::string text_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
-
-template <class Work>
-std::string error_of(Work work) {
-  try {
-    work();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 class OutputFileTest : public ::testing::Test {
  protected:
-  OutputFileTest() {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(::testing::TempDir()) / ("output_file_" + std::to_string(getpid()) + "_" + test->name());
-    fs::create_directories(folder_);
-  }
-  ~OutputFileTest() override { fs::remove_all(folder_); }
-
   std::vector<std::string> names() const {
     std::vector<std::string> all;
     for (const auto& entry : fs::directory_iterator(folder_)) all.push_back(entry.path().filename().string());
@@ -56,17 +30,18 @@ class OutputFileTest : public ::testing::Test {
     return all;
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_ / "";
 };
 
 TEST_F(OutputFileTest, AppearsWhenCommitted) {
   OutputFile file(folder_ / "a.spectral.exr");
   EXPECT_EQ(file.path().parent_path(), fs::canonical(folder_)) << "renaming works within one file system only";
   EXPECT_EQ(file.path().extension(), ".exr");
-  write(file.path(), "new");
+  write_bytes(file.path(), "new");
   EXPECT_FALSE(fs::exists(file.target()));
   file.commit();
-  EXPECT_EQ(text_of(folder_ / "a.spectral.exr"), "new");
+  EXPECT_EQ(bytes_of(folder_ / "a.spectral.exr"), "new");
   EXPECT_EQ(names().size(), 1u) << "no temporary is left";
 }
 
@@ -80,24 +55,24 @@ TEST_F(OutputFileTest, AppendsToWhatTheProcessHasOpen) {
     fs::create_symlink(folder + number, folder_ / "link");
     for (const fs::path& target : {fs::path(folder + number), folder_ / "link"}) {
       OutputFile file(target);
-      write(file.path(), "more, ");
+      write_bytes(file.path(), "more, ");
       file.commit();
     }
     fs::remove(folder_ / "link");
   }
-  EXPECT_EQ(text_of(folder_ / "log"), "before, more, more, more, more, more, more, ");
+  EXPECT_EQ(bytes_of(folder_ / "log"), "before, more, more, more, more, more, more, ");
   const Descriptor reading = open_file(folder_ / "log", O_RDONLY);
   EXPECT_THROW(OutputFile("/dev/fd/" + std::to_string(reading.get())), std::runtime_error);
 }
 
 TEST_F(OutputFileTest, LeavesTheOldFileUntilCommitted) {
-  write(folder_ / "a.png", "old");
+  write_bytes(folder_ / "a.png", "old");
   {
     OutputFile file(folder_ / "a.png");
-    write(file.path(), "half");
-    EXPECT_EQ(text_of(folder_ / "a.png"), "old");
+    write_bytes(file.path(), "half");
+    EXPECT_EQ(bytes_of(folder_ / "a.png"), "old");
   }
-  EXPECT_EQ(text_of(folder_ / "a.png"), "old");
+  EXPECT_EQ(bytes_of(folder_ / "a.png"), "old");
   EXPECT_EQ(names(), std::vector<std::string>{"a.png"});
 }
 
@@ -112,7 +87,7 @@ TEST_F(OutputFileTest, Moves) {
   files.emplace_back(folder_ / "b.png");
   files.erase(files.begin());
   ASSERT_EQ(names().size(), 1u) << "the temporary of a.png is gone, that of b.png is not";
-  write(files[0].path(), "b");
+  write_bytes(files[0].path(), "b");
   commit_all(files);
   EXPECT_EQ(names(), std::vector<std::string>{"b.png"});
   EXPECT_THROW(files[0].commit(), std::logic_error);
@@ -128,17 +103,17 @@ TEST_F(OutputFileTest, NewFilesHaveThePermissionsOfTheMask) {
 
 TEST_F(OutputFileTest, FollowsLinks) {
   fs::create_directories(folder_ / "elsewhere");
-  write(folder_ / "elsewhere" / "real.png", "old");
+  write_bytes(folder_ / "elsewhere" / "real.png", "old");
   fs::create_symlink("elsewhere/real.png", folder_ / "link.png");
   fs::create_symlink("elsewhere/none.png", folder_ / "dangling.png");
   for (const char* name : {"link.png", "dangling.png"}) {
     OutputFile file(folder_ / name);
-    write(file.path(), "new");
+    write_bytes(file.path(), "new");
     file.commit();
     EXPECT_TRUE(fs::is_symlink(folder_ / name));
   }
-  EXPECT_EQ(text_of(folder_ / "elsewhere" / "real.png"), "new");
-  EXPECT_EQ(text_of(folder_ / "elsewhere" / "none.png"), "new");
+  EXPECT_EQ(bytes_of(folder_ / "elsewhere" / "real.png"), "new");
+  EXPECT_EQ(bytes_of(folder_ / "elsewhere" / "none.png"), "new");
 }
 
 TEST_F(OutputFileTest, CopiesIntoPipes) {
@@ -146,9 +121,9 @@ TEST_F(OutputFileTest, CopiesIntoPipes) {
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   const std::string sent(300000, 'x');  // More than the buffer of a pipe.
   OutputFile file(pipe);
-  write(file.path(), sent);
+  write_bytes(file.path(), sent);
   std::string received;
-  std::thread reader([&] { received = text_of(pipe); });
+  std::thread reader([&] { received = bytes_of(pipe); });
   file.commit();
   reader.join();
   EXPECT_EQ(received, sent);
@@ -159,11 +134,11 @@ TEST_F(OutputFileTest, AFullDeviceIsAnErrorAndStaysADevice) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
   fs::create_symlink("/dev/full", folder_ / "full.png");
   fs::path temporary;
-  const std::string error = error_of([&] {
+  const std::string error = message([&] {
     OutputFile file(folder_ / "full.png");
     temporary = file.path();
     EXPECT_EQ(temporary.extension(), ".png");
-    write(temporary, "anything");
+    write_bytes(temporary, "anything");
     file.commit();
   });
   EXPECT_THAT(error, HasSubstr("full.png: cannot be written: No space left"));
@@ -174,67 +149,144 @@ TEST_F(OutputFileTest, AFullDeviceIsAnErrorAndStaysADevice) {
 
 TEST_F(OutputFileTest, DevicesAreFirst) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
-  write(folder_ / "a.png", "old");
+  write_bytes(folder_ / "a.png", "old");
   std::vector<OutputFile> files;
   files.emplace_back(folder_ / "a.png");
   files.emplace_back("/dev/full");
-  for (const OutputFile& file : files) write(file.path(), "new");
+  for (const OutputFile& file : files) write_bytes(file.path(), "new");
   EXPECT_THROW(commit_all(files), std::runtime_error);
-  EXPECT_EQ(text_of(folder_ / "a.png"), "old");
+  EXPECT_EQ(bytes_of(folder_ / "a.png"), "old");
 }
 
 TEST_F(OutputFileTest, AllFilesChangeOrNone) {
-  write(folder_ / "a", "old a");
-  write(folder_ / "c", "old c");
+  write_bytes(folder_ / "a", "old a");
+  write_bytes(folder_ / "c", "old c");
   fs::create_directories(folder_ / "other");
   std::vector<OutputFile> files;
   files.emplace_back(folder_ / "a");
   files.emplace_back(folder_ / "b");
   files.emplace_back(folder_ / "other/d");
   files.emplace_back(folder_ / "c");
-  for (const OutputFile& file : files) write(file.path(), "new");
+  for (const OutputFile& file : files) write_bytes(file.path(), "new");
   fs::remove(files[2].path());  // The third of four cannot take its name.
   EXPECT_THROW(commit_all(files), std::runtime_error);
   files.clear();
-  EXPECT_EQ(text_of(folder_ / "a"), "old a");
-  EXPECT_EQ(text_of(folder_ / "c"), "old c");
+  EXPECT_EQ(bytes_of(folder_ / "a"), "old a");
+  EXPECT_EQ(bytes_of(folder_ / "c"), "old c");
   EXPECT_THAT(names(), ::testing::ElementsAre("a", "c", "other"));
   EXPECT_TRUE(fs::is_empty(folder_ / "other"));
 }
 
 TEST_F(OutputFileTest, CommittingSeveralFilesLeavesNothingElse) {
-  write(folder_ / "a", "old");
+  write_bytes(folder_ / "a", "old");
   fs::permissions(folder_ / "a", fs::perms::owner_read | fs::perms::owner_write);
   std::vector<OutputFile> files;
   files.emplace_back(folder_ / "a");
   files.emplace_back(folder_ / "b");
-  for (const OutputFile& file : files) write(file.path(), "new");
+  for (const OutputFile& file : files) write_bytes(file.path(), "new");
   commit_all(files);
-  EXPECT_EQ(text_of(folder_ / "a"), "new");
-  EXPECT_EQ(text_of(folder_ / "b"), "new");
+  EXPECT_EQ(bytes_of(folder_ / "a"), "new");
+  EXPECT_EQ(bytes_of(folder_ / "b"), "new");
   EXPECT_EQ(fs::status(folder_ / "a").permissions(), fs::perms::owner_read | fs::perms::owner_write);
   EXPECT_THAT(names(), ::testing::ElementsAre("a", "b"));
 }
 
 TEST_F(OutputFileTest, TargetsThatCannotBe) {
-  write(folder_ / "file", "");
+  write_bytes(folder_ / "file", "");
   fs::create_symlink("loop", folder_ / "loop");
-  EXPECT_THAT(error_of([&] { OutputFile file(folder_); }), HasSubstr("is a folder; give the name of a file"));
-  EXPECT_THAT(error_of([&] { OutputFile file(folder_ / "x/"); }), HasSubstr("is a folder"));
-  EXPECT_THAT(error_of([&] { OutputFile file(folder_ / "no/a.png"); }), HasSubstr("there is no folder"));
-  EXPECT_THAT(error_of([&] { OutputFile file(folder_ / "file/a.png"); }), HasSubstr("there is no folder"));
-  EXPECT_THAT(error_of([&] { OutputFile file(folder_ / "loop"); }), HasSubstr("loop of symbolic links"));
-  EXPECT_THAT(error_of([&] { OutputFile file(""); }), HasSubstr("name of a file"));
+  EXPECT_THAT(message([&] { OutputFile file(folder_); }), HasSubstr("is a folder; give the name of a file"));
+  EXPECT_THAT(message([&] { OutputFile file(folder_ / "x/"); }), HasSubstr("is a folder"));
+  EXPECT_THAT(message([&] { OutputFile file(folder_ / "no/a.png"); }), HasSubstr("there is no folder"));
+  EXPECT_THAT(message([&] { OutputFile file(folder_ / "file/a.png"); }), HasSubstr("there is no folder"));
+  EXPECT_THAT(message([&] { OutputFile file(folder_ / "loop"); }), HasSubstr("loop of symbolic links"));
+  EXPECT_THAT(message([&] { OutputFile file(""); }), HasSubstr("name of a file"));
 }
 
 TEST_F(OutputFileTest, WriteProtection) {
   if (geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
-  write(folder_ / "a.png", "old");
+  write_bytes(folder_ / "a.png", "old");
   fs::permissions(folder_ / "a.png", fs::perms::owner_read);
-  EXPECT_THAT(error_of([&] { OutputFile file(folder_ / "a.png"); }), HasSubstr("Permission denied"));
+  EXPECT_THAT(message([&] { OutputFile file(folder_ / "a.png"); }), HasSubstr("Permission denied"));
   fs::permissions(folder_, fs::perms::owner_read | fs::perms::owner_exec);
-  EXPECT_THAT(error_of([&] { OutputFile file(folder_ / "b.png"); }), HasSubstr("cannot write to the folder"));
+  EXPECT_THAT(message([&] { OutputFile file(folder_ / "b.png"); }), HasSubstr("cannot write to the folder"));
   fs::permissions(folder_, fs::perms::owner_all);
+}
+
+TEST(ReplaceFileTest, WritesAllOrNothing) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder / "a";
+  replace_file(file, {"one ", "two"});
+  EXPECT_EQ(bytes_of(file), "one two");
+  std::ofstream(folder / "a.new") << "somebody's";
+  const std::filesystem::path beside =
+      folder / fmt::format(".tensorray-{:016x}.new", content_hash(file.filename().string()));
+  std::ofstream(beside) << "what a killed process left, which is longer than the next";
+  replace_file(file, {"three"});
+  EXPECT_EQ(bytes_of(file), "three");
+  EXPECT_EQ(bytes_of(folder / "a.new"), "somebody's");
+  EXPECT_FALSE(std::filesystem::exists(beside));
+  std::filesystem::create_symlink("a.new", beside);
+  EXPECT_THROW(replace_file(file, {"four"}), std::runtime_error);
+  EXPECT_EQ(bytes_of(folder / "a.new"), "somebody's");
+  EXPECT_THROW(replace_file(folder / "none" / "a", {"x"}), std::runtime_error);
+  const FileSizeLimit full(0);
+  EXPECT_THROW(replace_file(folder / "full", {"x"}), std::runtime_error);
+  EXPECT_FALSE(std::filesystem::exists(folder / "full"));
+}
+
+bool is_open(int descriptor) { return fcntl(descriptor, F_GETFD) >= 0; }
+
+TEST(DescriptorTest, BelongsToOneOwner) {
+  Descriptor first = open_file("/dev/null", O_WRONLY);
+  const int value = first.get();
+  EXPECT_TRUE(is_open(value));
+  EXPECT_NE(fcntl(value, F_GETFD) & FD_CLOEXEC, 0);
+  {
+    Descriptor second = std::move(first);
+    EXPECT_FALSE(first.is_open());
+    second = open_file("/dev/zero", O_RDONLY);
+    EXPECT_FALSE(is_open(value));
+    EXPECT_TRUE(second.close() && second.close());
+  }
+  EXPECT_FALSE(open_file("/none/none", O_RDONLY).is_open());
+  EXPECT_EQ(errno, ENOENT);
+}
+
+/// A pipe takes 64 KiB at once, and a signal interrupts.
+TEST(DescriptorTest, WritesAreWhole) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const Descriptor reader(ends[0]);
+  Descriptor writer(ends[1]);
+  const std::string sent(1 << 20, 'x');
+  std::size_t received = 0;
+  std::thread other([&] {
+    char buffer[1000];
+    for (ssize_t size = 0; (size = read(reader.get(), buffer, sizeof buffer)) > 0;)
+      received += static_cast<std::size_t>(size);
+  });
+  EXPECT_TRUE(write_whole(writer.get(), sent));
+  writer.close();
+  other.join();
+  EXPECT_EQ(received, sent.size());
+  const Descriptor full = open_file("/dev/full", O_WRONLY);
+  EXPECT_FALSE(write_whole(full.get(), "x"));
+  EXPECT_EQ(errno, ENOSPC);
+  EXPECT_TRUE(write_whole(-1, ""));
+  EXPECT_FALSE(write_whole(-1, "x"));
+}
+
+TEST(DescriptorTest, UnnamedFilesHaveNoName) {
+  const TemporaryFolder folder;
+  const Descriptor file = open_unnamed(folder / "");
+  ASSERT_TRUE(file.is_open());
+  EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
+  EXPECT_TRUE(write_whole(file.get(), "text"));
+  EXPECT_FALSE(open_unnamed(folder / "none").is_open());
+  const UnnamedFile shared;
+  std::ofstream(shared.path()) << "shared";
+  std::ifstream again(shared.path());
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(again), {}), "shared");
 }
 
 }  // namespace

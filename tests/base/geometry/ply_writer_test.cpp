@@ -1,28 +1,18 @@
-#include <fstream>
-#include <iterator>
-#include <stdexcept>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
+#include "base/geometry/box.h"
 #include "base/geometry/triangle_mesh.h"
 #include "base/text/byte_order.h"
+#include "tests/files.h"
 
 namespace tensorray {
 namespace {
-
-using ::testing::HasSubstr;
 
 TEST(PlyWriter, KeepsDoublePrecisionAndIsLittleEndian) {
   TriangleMesh mesh;
   mesh.vertices = {{0.1, -1e300, 3}, {1.0 / 3, 0, 0}, {0, 1, 0}};
   mesh.triangles = {{0, 1, 2}, {2, 1, 0}};
-  const auto path = std::filesystem::path(::testing::TempDir()) / "ply_writer_test.ply";
+  const Temporary path("a.ply");
   write_ply(path, mesh, PlyPositions::double_precision);
-  std::ifstream file(path, std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  std::filesystem::remove(path);
+  const std::string bytes = bytes_of(path);
 
   const std::string header =
       "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
@@ -45,12 +35,21 @@ TEST(PlyWriter, KeepsDoublePrecisionAndIsLittleEndian) {
 }
 
 TEST(PlyWriter, NamesAFileThatCannotBeWritten) {
-  try {
-    write_ply("/no/such/folder/a.ply", {}, PlyPositions::single_precision);
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("/no/such/folder/a.ply: cannot be written"));
-  }
+  EXPECT_THAT(message([] { write_ply("/no/such/folder/a.ply", {}, PlyPositions::single_precision); }),
+              HasSubstr("/no/such/folder/a.ply: cannot be written"));
+}
+
+TEST(TurnBetween, IsTheSmallestRotationOfOneDirectionToTheOther) {
+  const Vector3d directions[] = {{1, 0, 0},  {-1, 0, 0},  {0, 0, 2},   {0, 1e-9, -1},
+                                 {3, -4, 5}, {-3, 4, -5}, {1, 1e-7, 0}};
+  for (const Vector3d& from : directions)
+    for (const Vector3d& to : directions) {
+      const Eigen::Quaterniond turn = turn_between(from, to);
+      EXPECT_NEAR(turn.norm(), 1, 1e-9);
+      EXPECT_LT((turn * from.normalized() - to.normalized()).norm(), 1e-6) << from << "\n" << to;
+      const double angle = std::atan2(from.cross(to).norm(), from.dot(to));
+      EXPECT_NEAR(2 * std::atan2(turn.vec().norm(), turn.w()), angle, 1e-6) << from << "\n" << to;
+    }
 }
 
 }  // namespace

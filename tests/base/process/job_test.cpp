@@ -1,7 +1,6 @@
 #include "base/process/job.h"
 
 #include <atomic>
-#include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>

@@ -2,18 +2,20 @@
 
 #include "base/process/process_limits.h"
 
-#include <cmath>
+#include <csignal>
 #include <fstream>
 #include <map>
 #include <memory>
 #include <new>
 #include <thread>
 
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include "base/files/temporary_folder.h"
+#include "base/process/child_program.h"
+#include "base/process/progress.h"
+#include "tests/files.h"
 
 namespace tensorray {
 namespace {
@@ -133,6 +135,43 @@ TEST(ProcessLimitsTest, ExtraMemoryHasALimitForAWhile) {
     EXPECT_THROW(std::make_unique<char[]>(bytes), std::bad_alloc);
   }
   EXPECT_NO_THROW(std::make_unique<char[]>(bytes));
+}
+
+ProgramEnd run_shell(const std::string& command, const UnnamedFile& shared = {}) {
+  return run_program("/bin/sh", {"-c", command}, shared);
+}
+
+TEST(ChildProgram, SaysHowItEnded) {
+  const ProgramEnd good = run_shell("exit 0");
+  EXPECT_EQ(good.status, 0);
+  EXPECT_EQ(good.signal, 0);
+  EXPECT_EQ(good.error, "");
+  const ProgramEnd bad = run_shell("echo 'what went wrong' >&2; exit 3");
+  EXPECT_EQ(bad.status, 3);
+  EXPECT_EQ(bad.error, "what went wrong\n");
+  EXPECT_EQ(run_shell("kill -SEGV $$").signal, SIGSEGV);
+}
+
+TEST(ChildProgram, ThatIsInterruptedCancels) {
+  std::signal(SIGINT, SIG_DFL);  // A shell's background ignores it.
+  for (const char* signal : {"INT", "TERM"})
+    EXPECT_THROW(run_shell("kill -" + std::string(signal) + " $$"), Cancelled) << signal;
+}
+
+TEST(ChildProgram, ThatIsMissingIsNamed) {
+  EXPECT_NE(message([] {
+              run_program("/no/such/program", {}, UnnamedFile());
+            }).find("/no/such/program cannot be started: No such file"),
+            std::string::npos);
+}
+
+TEST(ChildProgram, SharesAFile) {
+  const UnnamedFile shared;
+  std::ofstream(shared.path()) << "there\n";
+  const std::string file = shared_file;
+  const ProgramEnd end = run_shell("read text < " + file + "; echo \"$text and back\" > " + file, shared);
+  EXPECT_EQ(end.status, 0) << end.error;
+  EXPECT_EQ(bytes_of(shared.path()), "there and back\n");
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/files/temporary_folder.h"
+
 namespace tensorray {
 namespace {
 
@@ -56,8 +58,7 @@ TEST(PathTextTest, EachPathComesBack) {
 }
 
 TEST(PathTextTest, NamesWithASuffixFit) {
-  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "path_text_names";
-  std::filesystem::create_directories(folder);
+  const TemporaryFolder folder;
   EXPECT_EQ(with_suffix("a/b.png", ".checkpoint"), "a/b.png.checkpoint");
   EXPECT_EQ(with_suffix("b.png", ".new"), "b.png.new");
   for (std::size_t size = 235; size <= 255; ++size) {
@@ -77,7 +78,6 @@ TEST(PathTextTest, NamesWithASuffixFit) {
   std::string umlauts;
   for (int i = 0; i < 127; ++i) umlauts += "ü";
   EXPECT_TRUE(is_utf8(with_suffix(folder / umlauts, ".checkpoint").string()));
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

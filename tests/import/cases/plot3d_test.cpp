@@ -1,10 +1,6 @@
 #include "tools/import/cases/plot3d.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include <vtkDataArray.h>
 #include <vtkPointData.h>
@@ -19,7 +15,6 @@ struct Form {
   bool big_endian = false, marks = false, count = false, blanking = false, doubles = false;
 };
 
-/// Writes PLOT3D records in any of the forms.
 class Writer {
  public:
   explicit Writer(const Form& form) : form_(form) {}

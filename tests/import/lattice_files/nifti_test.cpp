@@ -1,4 +1,3 @@
-#include <algorithm>
 
 #include <nifti1.h>
 #include <nifti2.h>
@@ -10,11 +9,6 @@
 
 namespace tensorray {
 namespace {
-
-using Eigen::Affine3d;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 /// A header of four axes, single precision, with a sform.
 nifti_1_header header_of(const Vector3i& size, int volumes, const Affine3d& to_world) {
@@ -289,7 +283,7 @@ TEST(Nifti, SecondVersionIsRead) {
   const TensorGrid grid = test::tensors_of(open_nifti(file), TensorOrder::fsl);
   test::expect_near(Vector3d(1, 2, 3).asDiagonal(), test::voxel(grid, {0, 0, 0}));
   header.dim[1] = header.dim[2] = header.dim[3] = std::int64_t{1} << 40;
-  file.write(file_of(header, test::bytes_of(six)));
+  write_bytes(file, file_of(header, test::bytes_of(six)));
   test::expect_error([&] { open_nifti(file); }, {"second.nii"});
 }
 

@@ -1,18 +1,29 @@
 #include "tools/import/lattices/lattice.h"
 
-#include <cmath>
 #include <limits>
+#include <map>
 
+#include <vtkCellData.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtk_exodusII.h>
+#include <zlib.h>
+
+#include "base/process/progress.h"
+#include "tests/import/mesh_files.h"
+#include "tests/import/mesh_fixtures.h"
+#include "tests/import/openfoam_case.h"
 #include "tests/import/voxel_support.h"
+#include "tests/import/vtk_files.h"
+#include "tools/import/import_file.h"
+#include "tools/import/lattices/tensor_order.h"
+#include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
-
 using Components = std::function<std::vector<double>(const Vector3i&)>;
+using namespace mesh_fixtures;
 
 /// A lattice of `components(index)`. Expects that slices are read from the last to the first, once each.
 Lattice lattice_of(const Vector3i& size, const Components& components) {
@@ -173,6 +184,234 @@ TEST(Lattice, GradientLeavesOutInactiveVoxels) {
   Matrix3d expected = Matrix3d::Zero();
   expected(0, 0) = 2;
   test::expect_near(expected, test::voxel(grid, {3, 4, 4}));
+}
+
+/// Entry (i, j) is 10 i + j (11 to 33); a symmetric tensor repeats its upper entries.
+Eigen::Matrix3d numbered(bool symmetric) {
+  Eigen::Matrix3d tensor;
+  tensor << 11, 12, 13, 21, 22, 23, 31, 32, 33;
+  if (symmetric) tensor.triangularView<Eigen::StrictlyLower>() = tensor.transpose();
+  return tensor;
+}
+
+TEST(TensorOrder, EachOrderPutsComponentsInTheirPlaces) {
+  const double vtk[] = {11, 22, 33, 12, 23, 13}, fsl[] = {11, 12, 13, 22, 23, 33}, mrtrix[] = {11, 22, 33, 12, 13, 23},
+               voigt[] = {11, 22, 33, 23, 13, 12}, lower[] = {11, 12, 22, 13, 23, 33},
+               full[] = {11, 12, 13, 21, 22, 23, 31, 32, 33};
+  EXPECT_EQ(tensor_of(vtk, TensorOrder::vtk), numbered(true));
+  EXPECT_EQ(tensor_of(fsl, TensorOrder::fsl), numbered(true));
+  EXPECT_EQ(tensor_of(mrtrix, TensorOrder::mrtrix), numbered(true));
+  EXPECT_EQ(tensor_of(voigt, TensorOrder::voigt), numbered(true));
+  EXPECT_EQ(tensor_of(lower, TensorOrder::lower_triangle), numbered(true));
+  EXPECT_EQ(tensor_of(full, TensorOrder::full), numbered(false));
+  const double plane[] = {11, 22, 33, 12}, two_by_two[] = {11, 12, 21, 22};
+  Eigen::Matrix3d expected;
+  expected << 11, 12, 0, 12, 22, 0, 0, 0, 33;
+  EXPECT_EQ(tensor_of(plane, TensorOrder::plane), expected);
+  expected << 11, 12, 0, 21, 22, 0, 0, 0, 0;
+  EXPECT_EQ(tensor_of(two_by_two, TensorOrder::two_by_two), expected);
+}
+
+// What formats say of components: their names and their order.
+/// Imports a file whose tensor is the same everywhere. @return that tensor.
+Matrix3d tensor_of_file(const std::filesystem::path& file, const std::string& array,
+                        std::optional<TensorOrder> order = {}, Take take = Take::tensor) {
+  ImportSettings settings;
+  settings.files = {file};
+  settings.array = array;
+  settings.order = order;
+  settings.take = take;
+  ImportReport report;
+  const TensorGrid grid = import_tensors(settings, Progress(), report);
+  Matrix3d tensor = Matrix3d::Constant(-1);
+  for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& value) { tensor = value; });
+  for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& value) { EXPECT_LT((value - tensor).norm(), 1e-6); });
+  return tensor;
+}
+
+void refuses(const std::filesystem::path& file, const std::string& array, std::optional<TensorOrder> order,
+             const char* part, Take take = Take::tensor) {
+  const auto import = [&] { tensor_of_file(file, array, order, take); };
+  EXPECT_THAT(import, ThrowsMessage<std::invalid_argument>(HasSubstr(part))) << file;
+}
+
+Matrix3d expected() {
+  Matrix3d tensor;
+  tensor << 1, 0.2, 0.3, 0.2, 2, 0.4, 0.3, 0.4, 3;
+  return tensor;
+}
+
+/// Expects the tensor `expected`, unless another is given.
+void expect_tensor(const std::filesystem::path& file, const std::string& array, std::optional<TensorOrder> order = {},
+                   const Matrix3d& tensor = expected()) {
+  EXPECT_LT((tensor_of_file(file, array, order) - tensor).norm(), 1e-6) << file << array;
+}
+
+/// The value of a uniform field may be a macro, or in another file.
+TEST(ComponentNames, UniformTensorsOfOpenFoamHaveItsOrder) {
+  const TemporaryFolder folder;
+  OpenFoamCase::write(folder);
+  const auto text = [](const std::string& name, const std::string& values) {
+    return "FoamFile { version 2.0; format ascii; class volSymmTensorField; object " + name +
+           "; } // xx xy xz yy yz zz\ndimensions [0 0 0 0 0 0 0];\n/* internalField uniform (7 7 7 7 7 7); */\n" +
+           values + "\nboundaryField { walls { type calculated; value uniform (9 9 9 9 9 9); } }\n";
+  };
+  const std::filesystem::path time = folder / "0.5";
+  const std::string uniform = "uniform (1 .2 .3 2 .4 3);\n";
+  std::string same = "nonuniform List<symmTensor>\n8\n(\n", list = "nonuniform List<symmTensor> 8(";
+  for (int i = 0; i < 8; ++i) {
+    same += "(1 .2 .3 2 .4 3)\n";
+    list += "(" + std::to_string(i) + " .2 .3 2 .4 3) ";
+  }
+  const std::map<std::string, std::string> fields{{"plain", "internalField   " + uniform},
+                                                  {"list", "internalField " + same + ")\n;\n"},
+                                                  {"macro", "inner " + uniform + "internalField $inner;"},
+                                                  {"included", "#include \"values\""},
+                                                  {"macro_list", "inner " + list + ");\ninternalField $inner;"},
+                                                  {"included_list", "#include \"list_of_values\""}};
+  for (const auto& [name, values] : fields) write_bytes(time / name, text(name, values));
+  write_bytes(time / "values", "internalField " + uniform);
+  write_bytes(time / "list_of_values", "internalField " + list + ");\n");
+  const std::string packed = text("packed", "internalField " + uniform);
+  const gzFile file = gzopen((time / "packed.gz").c_str(), "wb");
+  ASSERT_EQ(gzwrite(file, packed.data(), static_cast<unsigned>(packed.size())), static_cast<int>(packed.size()));
+  gzclose(file);
+  for (const char* name : {"plain", "list", "packed", "macro", "included"}) expect_tensor(folder, name);
+  const auto read = read_vtk_source(folder);
+  for (const char* name : {"macro_list", "included_list"}) {
+    vtkDataArray* const varied = read->GetCellData()->GetArray(name);
+    ASSERT_TRUE(varied);
+    EXPECT_EQ(varied->GetComponent(5, 0), 5) << name;
+    EXPECT_EQ(varied->GetComponent(5, 1), 2) << name;
+    EXPECT_NEAR(varied->GetComponent(5, 3), 0.2, 1e-6) << name;
+  }
+}
+
+/// A file as MOOSE writes it: names of element variables in alphabetical order, which VTK joins where it can.
+void write_exodus(const std::filesystem::path& path, const std::vector<std::string>& names,
+                  const std::vector<double>& values) {
+  int word = 8, stored = 8;
+  const int file = ex_create(path.c_str(), EX_CLOBBER, &word, &stored);
+  ASSERT_GE(file, 0);
+  ex_put_init(file, "stress", 3, 8, 1, 1, 0, 0);
+  const double x[] = {0, 1, 1, 0, 0, 1, 1, 0}, y[] = {0, 0, 1, 1, 0, 0, 1, 1}, z[] = {0, 0, 0, 0, 1, 1, 1, 1};
+  ex_put_coord(file, x, y, z);
+  ex_put_block(file, EX_ELEM_BLOCK, 1, "HEX8", 1, 8, 0, 0, 0);
+  const int corners[] = {1, 2, 3, 4, 5, 6, 7, 8};
+  ex_put_conn(file, EX_ELEM_BLOCK, 1, corners, nullptr, nullptr);
+  const int count = static_cast<int>(names.size());
+  ex_put_variable_param(file, EX_ELEM_BLOCK, count);
+  const double time = 0;
+  ex_put_time(file, 1, &time);
+  for (int i = 0; i < count; ++i) {
+    ex_put_variable_name(file, EX_ELEM_BLOCK, i + 1, names[static_cast<std::size_t>(i)].c_str());
+    ex_put_var(file, 1, EX_ELEM_BLOCK, i + 1, 1, 1, &values[static_cast<std::size_t>(i)]);
+  }
+  ex_close(file);
+}
+
+TEST(ComponentNames, VariablesOfExodusKeepTheirNames) {
+  const TemporaryFolder folder;
+  const std::filesystem::path six = folder / "six.e", nine = folder / "nine.e";
+  write_exodus(six, {"stress_xx", "stress_xy", "stress_xz", "stress_yy", "stress_yz", "stress_zz"},
+               {1, 0.2, 0.3, 2, 0.4, 3});
+  expect_tensor(six, "stress_xx,stress_yy,stress_zz,stress_xy,stress_yz,stress_xz");
+  expect_tensor(six, "stress_xx,stress_xy,stress_xz,stress_yy,stress_yz,stress_zz");
+  write_exodus(nine,
+               {"stress_xx", "stress_xy", "stress_xz", "stress_yx", "stress_yy", "stress_yz", "stress_zx", "stress_zy",
+                "stress_zz"},
+               {1, 2, 3, 4, 5, 6, 7, 8, 9});
+  const Matrix3d rows = (Matrix3d() << 1, 2, 3, 4, 5, 6, 7, 8, 9).finished(),
+                 upper = (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished();
+  expect_tensor(nine, "stress_x, stress_y, stress_z", {}, rows);
+  expect_tensor(nine, "stress_xx,stress_xy,stress_xz,stress_yx,stress_yy,stress_yz,stress_zx,stress_zy,stress_zz", {},
+                rows);
+  expect_tensor(nine, "stress_x:0,stress_y:1,stress_z:2,stress_x:1,stress_y:2,stress_x:2", TensorOrder::vtk, upper);
+  expect_tensor(nine,
+                "stress_x:stress_xx,stress_y:stress_yy,stress_z:stress_zz,stress_x:stress_xy,stress_y:stress_yz,"
+                "stress_x:stress_xz",
+                {}, upper);
+  refuses(nine, "stress_x:3,stress_y,stress_z", {}, "no array \"stress_x:3\"");
+}
+
+TEST(ComponentNames, SymmetricTensorsOfVtkHaveItsOrder) {
+  const TemporaryFolder folder;
+  const auto set = bar(0, 3);
+  for (const char* name : {"first S", "second"})
+    add_array<6>(*set, name,
+                 [](const Vector3d&) { return (Eigen::Matrix<double, 6, 1>() << 1, 2, 3, 0.2, 0.4, 0.3).finished(); });
+  set->GetPointData()->SetActiveTensors("second");
+  write_xml(*set, folder / "a.vtu");
+  expect_tensor(folder / "a.vtu", "second");
+  for (const bool binary : {false, true}) {
+    write_legacy(*set, folder / "a.vtk", binary);
+    EXPECT_NE(bytes_of(folder / "a.vtk").find("TENSORS6 second"), std::string::npos);
+    expect_tensor(folder / "a.vtk", "second");
+    EXPECT_THROW(tensor_of_file(folder / "a.vtk", "second", TensorOrder::fsl), std::invalid_argument);
+    EXPECT_THROW(tensor_of_file(folder / "a.vtk", "first S"), std::invalid_argument);  // It is a field's array.
+  }
+}
+
+/// A title may be any words, also a keyword.
+TEST(ComponentNames, OfTwoTensors6BothTellTheirOrder) {
+  const TemporaryFolder folder;
+  for (const std::string keyword : {"TENSORS6 ", "tensors6 "}) {
+    std::string text =
+        "# vtk DataFile Version 3.0\nTENSORS6 field\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 "
+        "0\nSPACING 1 1 1\nPOINT_DATA 8\n";
+    std::string numbers;
+    for (int i = 0; i < 8; ++i) numbers += "1 2 3 .2 .4 .3\n";
+    for (const std::string name : {"a", "b%20b"}) text += keyword + name + " float\n" + numbers;
+    write_bytes(folder / "a.vtk", text + "FIELD FieldData 1\nfield 6 8 float\n" + numbers);
+    for (const char* name : {"a", "b b"}) expect_tensor(folder / "a.vtk", name);
+    refuses(folder / "a.vtk", "field", {}, "give it with --order");
+  }
+}
+
+TEST(ComponentNames, ThreeScalarsAreAVector) {
+  const TemporaryFolder folder;
+  const Matrix3d gradient = (Matrix3d() << 1, 2, 3, -4, 5, 6, 7, -8, 10).finished();
+  const auto set = bar(0, 3);
+  const std::string list = "X Velocity,Y Velocity,Z Velocity";
+  for (int i = 0; i < 3; ++i)
+    add_array<1>(*set, std::string(1, "XYZ"[i]) + " Velocity",
+                 [&](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(gradient.row(i).dot(p)); });
+  write_xml(*set, folder / "a.vtu");
+  EXPECT_LT((tensor_of_file(folder / "a.vtu", list, {}, Take::gradient) - gradient).norm(), 1e-4);
+  EXPECT_LT((tensor_of_file(folder / "a.vtu", list, {}, Take::strain) - 0.5 * (gradient + gradient.transpose())).norm(),
+            1e-4);
+  refuses(folder / "a.vtu", "X Velocity,Y Velocity", {}, "--gradient-of lists 2 arrays, and a vector has 3",
+          Take::gradient);
+}
+
+/// The entries of a tensor that names tell, in orders that no program is known to use.
+TEST(ComponentNames, TellAnyOrder) {
+  const TemporaryFolder folder;
+  const Matrix3d rows = (Matrix3d() << 1, 2, 3, 4, 5, 6, 7, 8, 9).finished();
+  const std::vector<std::string> six{"ZZ", "xy", "s_11", "YZ", "S22", "zx"};
+  const std::vector<std::string> nine{"xx", "yy", "zz", "xy", "yz", "xz", "yx", "zy", "zx"};
+  const auto set = bar(0, 3);
+  add_array<6>(*set, "six",
+               [](const Vector3d&) { return (Eigen::Matrix<double, 6, 1>() << 3, 0.2, 1, 0.4, 2, 0.3).finished(); });
+  add_array<9>(*set, "nine",
+               [](const Vector3d&) { return (Eigen::Matrix<double, 9, 1>() << 1, 5, 9, 2, 6, 3, 4, 8, 7).finished(); });
+  std::string list;
+  for (int i = 0; i < 9; ++i) {
+    const std::string& name = nine[static_cast<std::size_t>(i)];
+    if (i < 6) set->GetPointData()->GetArray("six")->SetComponentName(i, six[static_cast<std::size_t>(i)].c_str());
+    set->GetPointData()->GetArray("nine")->SetComponentName(i, name.c_str());
+    add_array<1>(*set, "s" + name,
+                 [&](const Vector3d&) { return Eigen::Matrix<double, 1, 1>(rows(name[0] - 'x', name[1] - 'x')); });
+    list += (i == 0 ? "s" : ",s") + name;
+  }
+  const std::filesystem::path file = folder / "a.vtu";
+  write_xml(*set, file);
+  expect_tensor(file, "six");
+  refuses(file, "six", TensorOrder::fsl, "leave --order out");
+  expect_tensor(file, "nine", {}, rows);
+  expect_tensor(file, list, {}, rows);
+  expect_tensor(file, "szz,syz,syy,sxz,sxy,sxx", {}, (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished());
+  refuses(file, "szz,syz,syy,sxz,sxy,sxx", TensorOrder::fsl, "leave --order out");
 }
 
 }  // namespace

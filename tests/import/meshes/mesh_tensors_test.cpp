@@ -1,22 +1,22 @@
 #include "tools/import/meshes/mesh_tensors.h"
 
-#include <cmath>
-#include <limits>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <vtkCellData.h>
+#include <vtkImageData.h>
+#include <vtkPointData.h>
+#include <vtkRectilinearGrid.h>
 #include <vtkUnsignedCharArray.h>
 
+#include "base/process/progress.h"
+#include "tests/import/mesh_files.h"
 #include "tests/import/mesh_fixtures.h"
+#include "tests/import/vtk_files.h"
+#include "tools/import/import_file.h"
+#include "tools/import/meshes/flat_mesh.h"
 
 namespace tensorray {
 namespace {
 
 using namespace mesh_fixtures;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 const Map identity = [](const Vector3d& p) { return p; };
 
@@ -104,6 +104,309 @@ TEST(ChooseArray, ErrorsListTheArrays) {
   refuses("pressure", Take::strain, AllOf(list, HasSubstr("\"pressure\" has 1 component,"), HasSubstr("--strain-of")));
   add_array<3>(*mesh, "momentum", [](const Vector3d& p) { return p; });
   refuses("", Take::gradient, AllOf(HasSubstr("several"), HasSubstr("momentum (3 components, points)")));
+}
+
+Matrix3d symmetric(const Vector3d& p) { return linear_tensor(p) + linear_tensor(p).transpose(); }
+
+/// A cube with a point array for each component of a tensor: sxx, sxy, ..., szz.
+Grid cube_with_components(Matrix3d (*tensor)(const Vector3d&)) {
+  const Grid mesh = unit_cube(VTK_HEXAHEDRON, 2, [](const Vector3d& p) { return p; });
+  for (int i = 0; i < 9; ++i)
+    add_array<1>(*mesh, std::string("s") + "xyz"[i / 3] + "xyz"[i % 3],
+                 [&](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(tensor(p)(i / 3, i % 3)); });
+  return mesh;
+}
+
+void expect_tensors(vtkDataSet& mesh, const std::string& list, std::optional<TensorOrder> order,
+                    Matrix3d (*tensor)(const Vector3d&)) {
+  const ArrayChoice choice = join_arrays(mesh, list);
+  EXPECT_FALSE(choice.of_cells);
+  const auto joined = with_tensors(mesh, choice, Take::tensor, order);
+  auto* const tensors = vtkDoubleArray::SafeDownCast(joined->GetPointData()->GetArray(tensor_array));
+  ASSERT_TRUE(tensors);
+  for (vtkIdType i = 0; i < mesh.GetNumberOfPoints(); ++i) {
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> value(tensors->GetPointer(9 * i));
+    EXPECT_EQ(Matrix3d(value), tensor(Vector3d(mesh.GetPoint(i)))) << list;
+  }
+}
+
+TEST(ComponentArrays, NamesThatTellNoOrderNeedOne) {
+  const Grid mesh = cube_with_components(symmetric);
+  const char* const given[] = {"sxx", "syy", "szz", "syz", "sxz", "sxy"};
+  for (int i = 0; i < 6; ++i) mesh->GetPointData()->GetArray(given[i])->SetName(std::string(1, "abcdef"[i]).c_str());
+  const Grid same = Grid::New();
+  same->DeepCopy(mesh);
+  EXPECT_THAT([&] { with_tensors(*same, join_arrays(*same, "a,b,c,d,e,f"), Take::tensor, {}); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("--order")));
+  expect_tensors(*mesh, "a,b,c,d,e,f", TensorOrder::voigt, symmetric);
+}
+
+TEST(ComponentArrays, AnArrayWithCommasInItsNameIsNoList) {
+  const Grid mesh = cube_with_components(symmetric);
+  EXPECT_TRUE(is_array_list(*mesh, "sxx,syy"));
+  EXPECT_FALSE(is_array_list(*mesh, "sxx"));
+  mesh->GetPointData()->GetArray("sxx")->SetName("sxx,syy");
+  EXPECT_FALSE(is_array_list(*mesh, "sxx,syy"));
+}
+
+TEST(ComponentArrays, NamesInAListMayHaveCommas) {
+  for (const std::string form : {"S,@", "S, @", "S,stress,@", "@,"}) {
+    const Grid mesh = cube_with_components(symmetric);
+    std::string list;
+    for (const std::string each : {"xx", "yy", "zz", "xy", "yz", "xz"}) {
+      std::string name = form;
+      mesh->GetPointData()->GetArray(("s" + each).c_str())->SetName(name.replace(name.find('@'), 1, each).c_str());
+      list += (list.empty() ? "" : form == "S,@" ? "," : " , ") + name;
+    }
+    EXPECT_TRUE(is_array_list(*mesh, list));
+    expect_tensors(*mesh, list, TensorOrder::vtk, symmetric);
+  }
+}
+
+TEST(ComponentArrays, ErrorsNameTheArrayAndListTheOthers) {
+  const Grid mesh = cube_with_components(symmetric);
+  add_array<3>(*mesh, "v", [](const Vector3d& p) { return p; });
+  vtkNew<vtkDoubleArray> of_cells;
+  of_cells->SetName("c");
+  of_cells->SetNumberOfTuples(mesh->GetNumberOfCells());
+  of_cells->Fill(0);
+  mesh->GetCellData()->AddArray(of_cells);
+  for (const auto& [list, part] :
+       {std::pair("sxx,syy,szz,sxy,syz", "lists 5 arrays, and a tensor has 6 or 9"),
+        {"sxx,syy,szz,sxy,syz,sxz,", "no array \"\" in the list"},
+        {"sxx,syy,szz,sxy,syz,swz", "no array \"swz\" in the list"},
+        {"sxx,syy,szz,sxy,syz,v", "array \"v\" has 3 components"},
+        {"sxx,syy,szz,sxy,syz,c", "some arrays of the list are at points, others at cells"}}) {
+    const char* const given = list;
+    EXPECT_THAT([&] { join_arrays(*mesh, given); },
+                ThrowsMessage<std::invalid_argument>(AllOf(HasSubstr(part), HasSubstr("there are: sxx (1 component"))))
+        << list;
+  }
+  EXPECT_TRUE(mesh->GetPointData()->HasArray("sxx"));  // A refused list changes nothing.
+}
+
+// Meshes in a plane become slabs of one voxel.
+/// The square from 0 to 4 as 8 × 8 cells of a type, in a plane across `axis` at 1.5.
+Grid square(int cell_type, int axis = 2, int n = 8) {
+  auto grid = Grid::New();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  grid->SetPoints(points);
+  const auto at = [&](double i, double j) {
+    Vector3d p = Vector3d::Constant(1.5);
+    p[(axis + 1) % 3] = 4 * i / n;
+    p[(axis + 2) % 3] = 4 * j / n;
+    return points->InsertNextPoint(p.data());
+  };
+  const auto cell = [&](std::vector<vtkIdType> ids) {
+    grid->InsertNextCell(cell_type, static_cast<vtkIdType>(ids.size()), ids.data());
+  };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const double x = i, y = j;
+      if (cell_type == VTK_QUAD) cell({at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)});
+      if (cell_type == VTK_TRIANGLE) {
+        cell({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
+        cell({at(x, y + 1), at(x, y), at(x + 1, y + 1)});  // one of them clockwise
+      }
+      if (cell_type == VTK_QUADRATIC_QUAD)
+        cell({at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1), at(x + 0.5, y), at(x + 1, y + 0.5),
+              at(x + 0.5, y + 1), at(x, y + 0.5)});
+      if (cell_type == VTK_QUADRATIC_TRIANGLE) {
+        cell({at(x, y), at(x + 1, y), at(x, y + 1), at(x + 0.5, y), at(x + 0.5, y + 0.5), at(x, y + 0.5)});
+        cell({at(x + 1, y), at(x, y + 1), at(x + 1, y + 1), at(x + 0.5, y + 0.5), at(x + 0.5, y + 1),
+              at(x + 1, y + 0.5)});
+      }
+      if (cell_type == VTK_POLYGON) cell({at(x, y), at(x + 0.5, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)});
+    }
+  return grid;
+}
+
+/// A plane tensor that is linear in the position: xx, yy, zz, xy.
+Eigen::Vector4d plane(const Vector3d& p) { return {1 + p.x(), 2 - p.y() + p.z(), 0.25, 0.5 * p.x() - 0.25 * p.y()}; }
+
+Matrix3d plane_tensor(const Vector3d& p) {
+  const Eigen::Vector4d c = plane(p);
+  return (Matrix3d() << c[0], c[3], 0, c[3], c[1], 0, 0, 0, c[2]).finished();
+}
+
+TensorGrid import(const std::filesystem::path& file, ImportSettings settings = {}, double* thickness = nullptr) {
+  settings.files = {file};
+  ImportReport report;
+  TensorGrid grid = import_tensors(settings, Progress(), report);
+  if (thickness) *thickness = report.thickness;
+  return grid;
+}
+
+/// Expects an error of the user's with these words.
+void refuses(const std::filesystem::path& file, const ImportSettings& settings, const std::string& words) {
+  EXPECT_THAT([&] { import(file, settings); }, ThrowsMessage<std::invalid_argument>(HasSubstr(words)));
+}
+
+void expect_everywhere(const TensorGrid& grid, const std::function<Matrix3d(const Vector3d&)>& tensor) {
+  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& value) { EXPECT_LT((value - tensor(p)).norm(), 1e-5); });
+}
+
+ImportSettings settings_of_plane(const char* array, double thickness) {
+  ImportSettings settings;
+  settings.array = array;
+  settings.order = TensorOrder::plane;
+  settings.thickness = thickness;
+  return settings;
+}
+
+TEST(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
+  const TemporaryFolder folder;
+  for (const int axis : {0, 1, 2})
+    for (const int type : {VTK_TRIANGLE, VTK_QUAD, VTK_POLYGON, VTK_QUADRATIC_TRIANGLE, VTK_QUADRATIC_QUAD}) {
+      SCOPED_TRACE(std::to_string(type) + " across " + std::to_string(axis));
+      const Grid mesh = square(type, axis);
+      add_array<4>(*mesh, "stress", plane);
+      write_xml(*mesh, folder / "a.vtu");
+      ImportSettings settings = settings_of_plane("stress", 0.75);
+      settings.sampling.resolution = 0.25;
+      double thickness = 0;
+      const TensorGrid grid = import(folder / "a.vtu", settings, &thickness);
+      EXPECT_EQ(thickness, 0.75);
+      EXPECT_EQ(grid.active_voxels(), 17u * 17);
+      const Eigen::AlignedBox3i box = grid.active_box();
+      EXPECT_EQ(box.min()[axis], box.max()[axis]);
+      EXPECT_NEAR(grid.to_world.linear()(axis, axis), 0.75, 1e-12);
+      for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+        EXPECT_NEAR(p[axis], 1.5, 1e-12);
+        EXPECT_LT((tensor - plane_tensor(p)).norm(), 1e-5);
+      });
+    }
+}
+
+TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_QUAD);
+  add_array<4>(*mesh, "S", plane);
+  write_xml(*mesh, folder / "a.vtu");
+  ImportSettings settings;
+  refuses(folder / "a.vtu", settings, "no array suits");  // Four may be colours.
+  settings.array = "S";
+  refuses(folder / "a.vtu", settings, "plane (xx yy zz xy) or 2x2");
+  settings.order = TensorOrder::vtk;
+  EXPECT_THROW(import(folder / "a.vtu", settings), std::invalid_argument);
+  settings.order = TensorOrder::two_by_two;
+  for_each_voxel(import(folder / "a.vtu", settings), [&](const Vector3d& p, const Matrix3d& tensor) {
+    const Eigen::Vector4d c = plane(p);
+    EXPECT_LT((tensor - (Matrix3d() << c[0], c[1], 0, c[2], c[3], 0, 0, 0, 0).finished()).norm(), 1e-5);
+  });
+  const char* const names[] = {"XX", "YY", "ZZ", "XY"};
+  for (int i = 0; i < 4; ++i) mesh->GetPointData()->GetArray("S")->SetComponentName(i, names[i]);
+  write_xml(*mesh, folder / "b.vtu");
+  settings.order.reset();
+  expect_everywhere(import(folder / "b.vtu", settings), plane_tensor);
+}
+
+TEST(FlatMesh, ScalarArraysOfAPlaneAreJoined) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_QUAD);
+  const char* const names[] = {"sxx", "syy", "szz", "sxy"};
+  for (int i = 0; i < 4; ++i)
+    add_array<1>(*mesh, names[i], [i](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(plane(p)[i]); });
+  write_xml(*mesh, folder / "a.vtu");
+  for (const bool with_zz : {false, true}) {
+    ImportSettings settings;
+    settings.array = with_zz ? "sxy,szz,sxx,syy" : "sxx,syy,sxy";
+    for_each_voxel(import(folder / "a.vtu", settings), [&](const Vector3d& p, const Matrix3d& tensor) {
+      Matrix3d expected = plane_tensor(p);
+      if (!with_zz) expected(2, 2) = 0;
+      EXPECT_LT((tensor - expected).norm(), 1e-5);
+    });
+  }
+  ImportSettings settings;
+  settings.array = "sxx,syy,szz";
+  refuses(folder / "a.vtu", settings, "xx, yy, xy");
+}
+
+TEST(FlatMesh, FlatImagesAndRectilinearGrids) {
+  const TemporaryFolder folder;
+  vtkNew<vtkImageData> image;
+  image->SetDimensions(5, 4, 1);
+  add_array<4>(*image, "S", plane);
+  write_xml(*image, folder / "a.vti");
+  ImportSettings settings = settings_of_plane("S", 3);
+  const TensorGrid voxels = import(folder / "a.vti", settings);
+  EXPECT_EQ(voxels.active_voxels(), 20u);
+  EXPECT_EQ(voxels.to_world.linear()(2, 2), 3);
+  expect_everywhere(voxels, plane_tensor);
+
+  vtkNew<vtkRectilinearGrid> rectilinear;
+  vtkNew<vtkDoubleArray> x, y, z;
+  for (const double value : {0.0, 1.0, 4.0}) x->InsertNextValue(value), y->InsertNextValue(value);
+  z->InsertNextValue(2);
+  rectilinear->SetDimensions(3, 3, 1);
+  rectilinear->SetXCoordinates(x);
+  rectilinear->SetYCoordinates(y);
+  rectilinear->SetZCoordinates(z);
+  add_array<4>(*rectilinear, "S", plane);
+  write_xml(*rectilinear, folder / "a.vtr");
+  settings.sampling.resolution = 0.5;
+  const TensorGrid sampled = import(folder / "a.vtr", settings);
+  EXPECT_EQ(sampled.active_voxels(), 81u);
+}
+
+TEST(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
+  const TemporaryFolder folder;
+  ImportSettings settings;
+  const Grid bent_square = square(VTK_QUAD);
+  for (vtkIdType i = 0; i < bent_square->GetNumberOfPoints(); ++i) {
+    Vector3d p(bent_square->GetPoint(i));
+    p.z() += 0.1 * p.x();
+    bent_square->GetPoints()->SetPoint(i, p.data());
+  }
+  add_array<9>(*bent_square, "T", [](const Vector3d& p) { return flat(linear_tensor(p)); });
+  write_xml(*bent_square, folder / "bent.vtu");
+  EXPECT_THAT(
+      [&] { import(folder / "bent.vtu", settings); },
+      ThrowsMessage<std::invalid_argument>(testing::AllOf(HasSubstr("bent.vtu"), HasSubstr("surface in space"))));
+  settings.thickness = 1;
+  write_xml(*bar(0, 3), folder / "solid.vtu");
+  refuses(folder / "solid.vtu", settings, "--thickness");
+  write_xml(*image(), folder / "solid.vti");
+  refuses(folder / "solid.vti", settings, "--thickness");
+}
+
+/// Images keep their voxels, and are fields of a plane as meshes are.
+TEST(FlatMesh, VectorsOfImagesMayHaveTwoComponents) {
+  const TemporaryFolder folder;
+  auto image = vtkSmartPointer<vtkImageData>::New();
+  image->SetDimensions(5, 4, 1);
+  add_array<2>(*image, "v",
+               [](const Vector3d& p) { return Eigen::Vector2d(2 * p.x() + 3 * p.y(), 5 * p.x() - p.y()); });
+  add_array<1>(*image, "u", [](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(2 * p.x() + 3 * p.y()); });
+  add_array<1>(*image, "w", [](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(5 * p.x() - p.y()); });
+  write_xml(*image, folder / "a.vti");
+  const Matrix3d expected = (Matrix3d() << 2, 3, 0, 5, -1, 0, 0, 0, 0).finished();
+  for (const char* array : {"v", "u,w"})
+    for (const bool sampled : {false, true}) {
+      ImportSettings settings;
+      settings.array = array;
+      settings.take = Take::gradient;
+      if (sampled) settings.sampling.resolution = 0.5;
+      const TensorGrid grid = import(folder / "a.vti", settings);
+      EXPECT_EQ(grid.active_voxels(), sampled ? 9u * 7 : 5u * 4);
+      expect_everywhere(grid, [&](const Vector3d&) { return expected; });
+    }
+}
+
+TEST(FlatMesh, TheThicknessIsNoEdgeThatIsDivided) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_QUAD);
+  add_array<4>(*mesh, "stress", plane);
+  write_xml(*mesh, folder / "a.vtu");
+  ImportSettings settings = settings_of_plane("stress", 100);
+  for (const auto& resolution : {decltype(settings.sampling.resolution)(17), {Vector3i(17, 17, 1)}}) {
+    settings.sampling.resolution = resolution;
+    EXPECT_EQ(import(folder / "a.vtu", settings).active_voxels(), 17u * 17);
+  }
+  settings.sampling.resolution = {};
+  settings.sampling.bounds = Eigen::AlignedBox3d(Vector3d(1, 1, 0), Vector3d(1.25, 1.25, 0));  // Half of an edge.
+  EXPECT_EQ(import(folder / "a.vtu", settings).active_voxels(), 4u);
 }
 
 }  // namespace

@@ -1,9 +1,7 @@
 // Cells and points without data leave a hole of their own size; all kinds of data sets treat ghosts alike.
 
-#include <cmath>
 #include <limits>
 
-#include <gtest/gtest.h>
 #include <vtkCellData.h>
 #include <vtkIntArray.h>
 #include <vtkUnsignedCharArray.h>
@@ -22,7 +20,6 @@ using namespace mesh_fixtures;
 
 const double nan = std::numeric_limits<double>::quiet_NaN();
 
-/// Imports voxels of edge 1/2.
 TensorGrid import_voxels(const std::filesystem::path& file, const std::string& array, Take take = Take::tensor,
                          CellValues values = CellValues::linear) {
   ImportSettings settings;

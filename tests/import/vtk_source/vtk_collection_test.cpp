@@ -1,13 +1,19 @@
-// Blocks (.vtm) and time series (.pvd).
 
-#include <string>
+#include <vtkCellData.h>
+#include <vtkPointData.h>
+#include <vtkUnsignedCharArray.h>
 
+#include "base/process/progress.h"
 #include "tests/import/mesh_files.h"
+#include "tests/import/mesh_fixtures.h"
 #include "tests/import/vtk_files.h"
+#include "tools/import/import_file.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
 namespace {
+
+using Set = vtkSmartPointer<vtkDataSet>;
 
 std::string collection(const std::string& type, const std::string& contents) {
   return "<?xml version=\"1.0\"?>\n<VTKFile type=\"" + type + "\" version=\"1.0\">\n<" + type + ">\n" + contents +
@@ -16,6 +22,11 @@ std::string collection(const std::string& type, const std::string& contents) {
 
 std::string blocks(const std::string& contents) { return collection("vtkMultiBlockDataSet", contents); }
 std::string series(const std::string& contents) { return collection("Collection", contents); }
+
+/// A collection of both files.
+std::string both(const std::string& first, const std::string& second) {
+  return blocks("<DataSet file=\"" + first + "\"/><DataSet file=\"" + second + "\"/>");
+}
 
 TEST(VtkCollection, BlocksAtAnyDepthAreOneMeshWithoutSurfaces) {
   const TemporaryFolder folder;
@@ -47,7 +58,7 @@ TEST(VtkCollection, OfATimeSeriesTheLastTimeWithAllItsParts) {
   write_xml(*bar(0, 1), folder / "early.vtu");
   write_xml(*bar(0, 3), folder / "late0.vtu");
   write_xml(*bar(3, 2), folder / "late1.vtu");
-  write_bytes(folder / "late.vtm", blocks("<DataSet file=\"late0.vtu\"/><DataSet file=\"late1.vtu\"/>"));
+  write_bytes(folder / "late.vtm", both("late0.vtu", "late1.vtu"));
   write_bytes(folder / "parts.pvd", series("<DataSet timestep=\"1e1\" part=\"0\" file=\"late0.vtu\"/>\n"
                                            "<DataSet timestep=\"9\" part=\"0\" file=\"early.vtu\"/>\n"
                                            "<DataSet timestep=\"10\" part=\"1\" file=\"late1.vtu\"/>\n"));
@@ -79,7 +90,7 @@ TEST(VtkCollection, APartThatIsNamedTwiceForOneTimeCountsOnceOrIsRefused) {
               std::string::npos)
         << error;
   }
-  write_bytes(folder / "both.vtm", blocks("<DataSet file=\"a.vtu\"/><DataSet file=\"restarted.vtu\"/>"));
+  write_bytes(folder / "both.vtm", both("a.vtu", "restarted.vtu"));
   EXPECT_NE(read_error(folder / "both.vtm").find("names the same mesh twice"), std::string::npos);
 }
 
@@ -125,6 +136,171 @@ TEST(VtkCollection, ErrorsNameTheFile) {
   refuses("a.pvd", series("<DataSet file=\"a.vtu\"/>").substr(0, 80), "a.pvd", "cut off");
   refuses("a.pvd", "<VTKFile type=\"Collection\"><Collection></VTKFile>", "a.pvd", "a.pvd");
   refuses("a.xdmf", "<Xdmf></Xdmf>", "a.xdmf", "has no grid");
+}
+
+// Blocks that overlap, and copies of other pieces' cells and points: what counts at a voxel.
+/// Adds the array "T", of points or cells, of multiples of the identity.
+void add_values(vtkDataSet& set, bool of_cells, double value) {
+  vtkNew<vtkDoubleArray> array;
+  array->SetName("T");
+  array->SetNumberOfComponents(9);
+  const vtkIdType count = of_cells ? set.GetNumberOfCells() : set.GetNumberOfPoints();
+  for (vtkIdType i = 0; i < count; ++i) array->InsertNextTuple9(value, 0, 0, 0, value, 0, 0, 0, value);
+  (of_cells ? static_cast<vtkDataSetAttributes*>(set.GetCellData()) : set.GetPointData())->AddArray(array);
+}
+
+void set_value(vtkDataSetAttributes& data, vtkIdType i, double value) {
+  for (const int diagonal : {0, 4, 8}) data.GetArray("T")->SetComponent(i, diagonal, value);
+}
+
+/// A cube of n³ cells: an image, or a structured or unstructured grid.
+Set cube(const std::string& ending, double first, double edge, int n) {
+  const auto at = [=](const Vector3d& p) { return Vector3d((Vector3d::Constant(first) + n * edge * p)); };
+  if (ending == ".vts") return mesh_fixtures::curvilinear(Eigen::Vector3i::Constant(n + 1), at);
+  if (ending == ".vtu") return mesh_fixtures::unit_cube(VTK_TETRA, n, at);
+  auto image = vtkSmartPointer<vtkImageData>::New();
+  image->SetDimensions(n + 1, n + 1, n + 1);
+  image->SetOrigin(first, first, first);
+  image->SetSpacing(edge, edge, edge);
+  return image;
+}
+
+TensorGrid imported(const std::filesystem::path& path, double voxel, ImportReport& report) {
+  ImportSettings settings;
+  settings.files = {path};
+  settings.array = "T";
+  settings.sampling.resolution = voxel;
+  return import_tensors(settings, Progress(), report);
+}
+
+TEST(OverlappingBlocks, TheFinerCellCountsInAnyOrder) {
+  const TemporaryFolder folder;
+  for (const std::string ending : {".vti", ".vts", ".vtu"})
+    for (const bool of_cells : {false, true}) {
+      const Set coarse = cube(ending, 0, 1, 4), fine = cube(ending, 1, 0.5, 4);
+      add_values(*coarse, of_cells, 1);
+      add_values(*fine, of_cells, 2);
+      write_xml(*coarse, folder / ("a" + ending));
+      write_xml(*fine, folder / ("b" + ending));
+      for (const auto& [first, second] : {std::pair("a", "b"), {"b", "a"}})
+        for (const double voxel : {0.3, 0.5, 1.0}) {  // Of 1, values are averages over thinner cells.
+          write_bytes(folder / "both.vtm", both(first + ending, second + ending));
+          ImportReport report;
+          const TensorGrid grid = imported(folder / "both.vtm", voxel, report);
+          std::size_t inside = 0;
+          mesh_fixtures::for_each_voxel(grid, [&](const Vector3d& x, const Matrix3d& tensor) {
+            const bool is_fine = (x.array() > 1 - 1e-5).all() && (x.array() < 3 + 1e-5).all();
+            inside += is_fine;
+            EXPECT_LT((tensor - (is_fine ? 2 : 1) * Matrix3d::Identity()).norm(), 1e-5)
+                << ending << of_cells << first << voxel << " " << x.transpose();
+          });
+          EXPECT_EQ(report.mesh->overlaid, inside) << ending << voxel;
+        }
+    }
+}
+
+TEST(OverlappingBlocks, PiecesWithACommonFaceAreJoined) {
+  const TemporaryFolder folder;
+  write_xml(*bar(0, 3), folder / "a.vtu");
+  write_xml(*bar(3, 2), folder / "b.vtu");
+  write_bytes(folder / "both.vtm", both("a.vtu", "b.vtu"));
+  const auto read = read_vtk_source(folder / "both.vtm");
+  EXPECT_EQ(read->GetNumberOfPoints(), 24);
+  EXPECT_FALSE(read->GetCellData()->HasArray(layer_array));
+}
+
+/// Marks the last cell, or the points of the last face, as copies with a value that is not right any more.
+void add_stale(vtkUnstructuredGrid& set, bool of_cells) {
+  vtkNew<vtkUnsignedCharArray> marks;
+  marks->SetName(vtkDataSetAttributes::GhostArrayName());
+  const vtkIdType count = of_cells ? set.GetNumberOfCells() : set.GetNumberOfPoints(), stale = of_cells ? 1 : 4;
+  vtkDataSetAttributes& data = *set.GetAttributes(of_cells ? vtkDataObject::CELL : vtkDataObject::POINT);
+  for (vtkIdType i = 0; i < count; ++i) {
+    marks->InsertNextValue(i < count - stale ? 0 : 1);  // DUPLICATECELL and DUPLICATEPOINT.
+    if (i >= count - stale) set_value(data, i, 7);
+  }
+  data.AddArray(marks);
+}
+
+TEST(OverlappingBlocks, CopiesNeverCountWhereTheirOriginIs) {
+  const TemporaryFolder folder;
+  for (const bool of_cells : {true, false}) {
+    const auto first = bar(0, 3), second = bar(of_cells ? 2 : 3, 2);
+    for (vtkDataSet* const set : {first.Get(), second.Get()}) add_values(*set, of_cells, 1);
+    add_stale(*first, of_cells);
+    write_xml(*first, folder / "a.vtu");
+    write_xml(*second, folder / "b.vtu");
+    write_bytes(folder / "all.vtm", both("a.vtu", "b.vtu"));
+    const auto merged = bar(0, 3);  // One file that has a copy and its origin.
+    vtkNew<vtkIdList> corners;
+    merged->GetCellPoints(1, corners);
+    merged->InsertNextCell(VTK_HEXAHEDRON, corners);
+    merged->GetCellData()->Initialize();
+    add_values(*merged, true, 1);
+    add_stale(*merged, true);
+    write_xml(*merged, folder / "merged.vtu");
+    for (const char* const name : {"all.vtm", "merged.vtu"}) {
+      ImportReport report;
+      mesh_fixtures::for_each_voxel(imported(folder / name, 0.25, report), [&](const auto& x, const Matrix3d& tensor) {
+        EXPECT_LT((tensor - Matrix3d::Identity()).norm(), 1e-6) << name << of_cells << " " << x.transpose();
+      });
+      EXPECT_EQ(report.mesh->overlaid, 0u);
+    }
+  }
+}
+
+/// Blocks as adaptive codes write them: each halves the cells of the one before within a part of it.
+std::string amr(const std::string& form, int levels) {
+  const std::string folder = "levels/";
+  std::string text, name = form == ".vth" ? "vtkOverlappingAMR" : "vtkMultiBlockDataSet";
+  for (int level = 0; level < levels; ++level) {
+    const std::string set =
+        "<DataSet index=\"0\" amr_box=\"0 7 0 7 0 7\" file=\"" + folder + std::to_string(level) + ".vti\"/>";
+    text +=
+        "<Block level=\"" + std::to_string(level) + "\" index=\"" + std::to_string(level) + "\">" + set + "</Block>\n";
+  }
+  return "<VTKFile type=\"" + name + "\" version=\"1.1\"><" + name + ">" + text + "</" + name + "></VTKFile>\n";
+}
+
+TEST(OverlappingBlocks, LevelsOfAdaptiveRefinementArriveAsLevels) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "levels");
+  const double begins[] = {0, 8, 12}, edges[] = {1, 0.5, 0.25};
+  for (int level = 0; level < 3; ++level) {
+    const Set block = cube(".vti", begins[level], edges[level], level == 0 ? 32 : 16);
+    add_values(*block, true, level + 1);
+    write_xml(*block, folder / "levels" / (std::to_string(level) + ".vti"));
+  }
+  for (const std::string form : {".vth", ".vtm"})
+    for (const int levels : {2, 3}) {
+      SCOPED_TRACE(form + std::to_string(levels));
+      write_bytes(folder / ("all" + form), amr(form, levels));
+      ImportReport report;
+      ImportSettings settings;
+      settings.files = {folder / ("all" + form)};
+      const TensorGrid grid = import_tensors(settings, Progress(), report);
+      EXPECT_NEAR(report.mesh->voxel.x(), 1, 1e-9);
+      ASSERT_EQ(grid.finer.size(), static_cast<std::size_t>(levels - 1));
+      for (int level = 1; level < levels; ++level) {
+        TensorGrid one;
+        one.blocks = grid.finer[static_cast<std::size_t>(level - 1)];
+        one.to_world = grid.to_world * Eigen::Scaling(std::pow(0.5, level));
+        const Eigen::AlignedBox3d block(Vector3d::Constant(begins[level]),
+                                        Vector3d::Constant(begins[level] + 16 * edges[level]));
+        std::size_t inside = 0;
+        mesh_fixtures::for_each_voxel(one, [&](const Vector3d& x, const Matrix3d& tensor) {
+          const bool is_last =
+              level + 1 == levels ||
+              !Eigen::AlignedBox3d(Vector3d::Constant(begins[level + 1] - 0.6 * edges[level]),
+                                   Vector3d::Constant(begins[level + 1] + 16 * edges[level + 1] + 0.6 * edges[level]))
+                   .contains(x);
+          if (!block.contains(x) || !is_last) return;
+          ++inside;
+          EXPECT_LT((tensor - (level + 1) * Matrix3d::Identity()).norm(), 1e-5) << x.transpose();
+        });
+        EXPECT_GT(inside, 2000u);
+      }
+    }
 }
 
 }  // namespace

@@ -1,12 +1,7 @@
 // Files that VTK would read wrongly, or that would crash it, are errors before or after VTK reads them. All are read in
 // child processes: no file ends the other tests.
 
-#include <cmath>
-#include <string>
 #include <utility>
-#include <vector>
-
-#include <gmock/gmock.h>
 
 #include "tests/import/mesh_files.h"
 #include "tests/import/vtk_files.h"
@@ -14,9 +9,6 @@
 
 namespace tensorray {
 namespace {
-
-using testing::AllOf;
-using testing::HasSubstr;
 
 class VtkDamage : public testing::Test {
  protected:

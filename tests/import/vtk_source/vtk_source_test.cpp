@@ -1,22 +1,36 @@
 #include "tools/import/vtk_source/vtk_source.h"
 
-#include <cmath>
-#include <sstream>
-#include <string>
-#include <vector>
+#include <array>
+#include <cstring>
 
-#include <Eigen/Geometry>
 #include <vtkAppendFilter.h>
+#include <vtkCellData.h>
+#include <vtkDataArray.h>
+#include <vtkDataSet.h>
+#include <vtkLongLongArray.h>
+#include <vtkPointData.h>
+#include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
+#include <vtk_cgns.h>
+// clang-format off
+#include VTK_CGNS(cgnslib.h)
+// clang-format on
 
+#include "base/process/progress.h"
+#include "tests/import/hdf5_writer.h"
 #include "tests/import/mesh_files.h"
+#include "tests/import/mesh_fixtures.h"
 #include "tests/import/openfoam_case.h"
 #include "tests/import/vtk_files.h"
+#include "tools/import/import_file.h"
 #include "tools/import/meshes/mesh_tensors.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 
 namespace tensorray {
 namespace {
+
+using Ints = std::vector<int>;
+using Grid = vtkSmartPointer<vtkUnstructuredGrid>;
 
 TEST(VtkSourceTest, XmlFilesOfEveryEncoding) {
   const TemporaryFolder folder;
@@ -143,6 +157,234 @@ TEST(VtkSourceTest, IncompleteOpenFoamCases) {
   std::filesystem::create_directories(folder / "processor0");
   std::filesystem::remove_all(folder / "constant");
   EXPECT_NE(error().find("has no mesh"), std::string::npos);
+}
+
+// Polyhedra as VTK 9.4 writes them: in four arrays of faces.
+/// The faces of a cube with the corners of `bar`, which are those of cube i from 4 i on.
+const std::vector<Ints> cube_faces{{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
+
+/// Those of a bar of two cubes, which has the first one as a hexahedron.
+struct Faces {
+  Ints connectivity, offsets, of_cells{0, 1, 2, 3, 4, 5}, cells{0, 6};
+};
+
+Faces faces_of_second() {
+  Faces result;
+  for (const Ints& face : cube_faces) {
+    for (const int corner : face) result.connectivity.push_back(4 + corner);
+    result.offsets.push_back(static_cast<int>(result.connectivity.size()));
+  }
+  return result;
+}
+
+/// A hexahedron, and a polyhedron.
+Grid mixed_bar() {
+  const Grid bars = bar(0, 2), mixed = Grid::New();
+  mixed->SetPoints(bars->GetPoints());
+  vtkNew<vtkIdList> corners, stream;
+  bars->GetCellPoints(0, corners);
+  mixed->InsertNextCell(VTK_HEXAHEDRON, corners);
+  stream->InsertNextId(6);
+  for (const Ints& face : cube_faces) {
+    stream->InsertNextId(4);
+    for (const int corner : face) stream->InsertNextId(4 + corner);
+  }
+  mixed->InsertNextCell(VTK_POLYHEDRON, stream);
+  return with_arrays(mixed);
+}
+
+void expect_linear(const std::filesystem::path& path, std::size_t voxels) {
+  ImportSettings settings;
+  settings.files = {path};
+  settings.array = "tensor";
+  settings.sampling.resolution = 0.25;
+  ImportReport report;
+  const TensorGrid grid = import_tensors(settings, Progress(), report);
+  EXPECT_EQ(grid.active_voxels(), voxels);
+  mesh_fixtures::for_each_voxel(grid, [](const Eigen::Vector3d& x, const Eigen::Matrix3d& tensor) {
+    EXPECT_NEAR(tensor(1, 2), number(x.data(), 5), 1e-4) << x.transpose();
+  });
+}
+
+TEST(Polyhedra, OfVtk94AreReadInAllFormsOfItsXml) {
+  const TemporaryFolder folder;
+  const Faces faces = faces_of_second();
+  for (const Mode mode : {Mode::ascii, Mode::binary, Mode::raw_compressed, Mode::raw_plain}) {
+    const Grid grid = mixed_bar();
+    for (const auto& [name, values] : {std::pair("face_connectivity", &faces.connectivity),
+                                       {"face_offsets", &faces.offsets},
+                                       {"polyhedron_to_faces", &faces.of_cells},
+                                       {"polyhedron_offsets", &faces.cells}}) {
+      vtkNew<vtkLongLongArray> array;
+      array->SetName(name);
+      for (const int value : *values) array->InsertNextValue(value);
+      grid->GetFieldData()->AddArray(array);
+    }
+    write_xml(*grid, folder / "a.vtu", mode);
+    std::string text = bytes_of(folder / "a.vtu");
+    // What the installed version writes as fields is moved among the cells, and its own arrays of faces are renamed.
+    const std::size_t begin = text.find("<FieldData>") + 11, end = text.find("</FieldData>");
+    ASSERT_LT(begin, end);
+    const std::string moved = text.substr(begin, end - begin);
+    for (const char* own : {"\"faces\"", "\"faceoffsets\""})
+      if (text.find(own) != std::string::npos) text[text.find(own) + 1] = 'x';
+    text.insert(text.find("</Cells>"), moved);
+    text.erase(begin, end - begin);
+    write_bytes(folder / "a.vtu", text);
+    expect_linear(folder / "a.vtu", 9 * 5 * 5);
+    write_bytes(folder / "a.pvtu",
+                "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><Piece Source=\"a.vtu\"/>"
+                "</PUnstructuredGrid></VTKFile>");
+    expect_linear(folder / "a.pvtu", 9 * 5 * 5);
+    if (mode != Mode::ascii) continue;
+    const std::size_t at = text.find('>', text.find("Name=\"polyhedron_to_faces\"")) + 1;
+    write_bytes(folder / "a.vtu", text.replace(text.find('5', at), 1, "9"));
+    EXPECT_THAT(read_error(folder / "a.vtu"), testing::HasSubstr("its polyhedra name faces that are not there"));
+  }
+}
+
+TEST(Polyhedra, OfVtkHdfAreReadOfEachPart) {
+  const TemporaryFolder folder;
+  const Faces one = faces_of_second();
+  {
+    Hdf5Writer file(folder / "a.vtkhdf");
+    const auto twice = [&](const std::string& name, const Ints& values) {
+      Ints both = values;
+      both.insert(both.end(), values.begin(), values.end());
+      file.write("/VTKHDF/" + name, {both.size()}, both);
+    };
+    const auto from_zero = [](Ints ends) {
+      ends.insert(ends.begin(), 0);
+      return ends;
+    };
+    file.group("/VTKHDF");
+    file.attribute("/VTKHDF", "Version", std::vector<double>{2, 5});
+    file.attribute("/VTKHDF", "Type", "UnstructuredGrid");
+    twice("NumberOfPoints", {12});
+    twice("NumberOfCells", {2});
+    twice("NumberOfConnectivityIds", {16});
+    twice("NumberOfFaces", {6});
+    twice("NumberOfFaceConnectivityIds", {24});
+    twice("NumberOfPolyhedronToFaceIds", {6});
+    twice("Connectivity", {0, 4, 5, 1, 2, 6, 7, 3, 4, 5, 6, 7, 8, 9, 10, 11});
+    twice("Offsets", {0, 8, 16});
+    twice("Types", {12, 42});
+    twice("FaceConnectivity", one.connectivity);
+    twice("FaceOffsets", from_zero(one.offsets));
+    twice("PolyhedronToFaces", one.of_cells);
+    twice("PolyhedronOffsets", from_zero(one.cells));
+    std::vector<double> points, values;
+    for (int i = 0; i < 24; ++i) {
+      const double x[] = {double(i / 4 - i / 12), double(i % 2), double(i / 2 % 2)};
+      points.insert(points.end(), x, x + 3);
+      for (int c = 0; c < 9; ++c) values.push_back(number(x, c));
+    }
+    file.write("/VTKHDF/Points", {24, 3}, points);
+    file.write("/VTKHDF/PointData/tensor", {24, 9}, values);
+  }
+  expect_linear(folder / "a.vtkhdf", 17 * 5 * 5);
+}
+
+constexpr std::array<cgsize_t, 3> points{3, 4, 5};
+
+/// A number that tells positions, components and steps of time apart.
+double velocity(const double* p, int component, int step) {
+  return (component + 1) * p[0] + 10 * p[1] - (component + 2) * p[2] + 100 * step;
+}
+
+void check(int error) { ASSERT_EQ(error, CG_OK) << cg_get_error(); }
+
+void write_zone(int file, int base, const std::string& name, double first_x, int steps) {
+  const std::array<cgsize_t, 9> size{points[0], points[1], points[2], points[0] - 1, points[1] - 1, points[2] - 1};
+  int zone = 0, id = 0, solution = 0;
+  check(cg_zone_write(file, base, name.c_str(), size.data(), CGNS_ENUMV(Structured), &zone));
+  /// The values at all points.
+  const auto values_of = [&](const auto& value) {
+    std::vector<double> values;
+    for (cgsize_t i = 0; i < points[0] * points[1] * points[2]; ++i) {
+      const double p[3] = {first_x + static_cast<double>(i % points[0]),
+                           0.5 * static_cast<double>(i / points[0] % points[1]),
+                           0.25 * static_cast<double>(i / points[0] / points[1])};
+      values.push_back(value(p));
+    }
+    return values;
+  };
+  for (int axis = 0; axis < 3; ++axis)
+    check(cg_coord_write(file, base, zone, CGNS_ENUMV(RealDouble), (std::string("Coordinate") + "XYZ"[axis]).c_str(),
+                         values_of([axis](const double* p) { return p[axis]; }).data(), &id));
+  std::string solutions;
+  for (int step = 0; step < steps; ++step) {
+    const std::string of_step = "Solution" + std::to_string(step);
+    solutions += of_step + std::string(32 - of_step.size(), ' ');
+    check(cg_sol_write(file, base, zone, of_step.c_str(), CGNS_ENUMV(Vertex), &solution));
+    for (int c = 0; c < 3; ++c)
+      check(cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealDouble),
+                           (std::string("Velocity") + "XYZ"[c]).c_str(),
+                           values_of([=](const double* p) { return velocity(p, c, step); }).data(), &id));
+  }
+  if (steps == 1) return;
+  const std::array<cgsize_t, 2> shape{32, steps};
+  check(cg_ziter_write(file, base, zone, "ZoneIterativeData"));
+  check(cg_goto(file, base, "Zone_t", zone, "ZoneIterativeData_t", 1, "end"));
+  check(cg_array_write("FlowSolutionPointers", CGNS_ENUMV(Character), 2, shape.data(), solutions.data()));
+}
+
+/// Two zones that meet at x = 2.
+void write_cgns(const std::filesystem::path& path, int type, int steps) {
+  int file = 0, base = 0;
+  check(cg_set_file_type(type));
+  check(cg_open(path.c_str(), CG_MODE_WRITE, &file));
+  check(cg_base_write(file, "Base", 3, 3, &base));
+  if (steps > 1) {
+    const std::vector<double> times{0.5, 1, 1.5};
+    const cgsize_t count = steps;
+    check(cg_biter_write(file, base, "BaseIterativeData", steps));
+    check(cg_goto(file, base, "BaseIterativeData_t", 1, "end"));
+    check(cg_array_write("TimeValues", CGNS_ENUMV(RealDouble), 1, &count, times.data()));
+  }
+  write_zone(file, base, "left", 0, steps);
+  write_zone(file, base, "right", 2, steps);
+  check(cg_close(file));
+}
+
+void expect_velocity(vtkDataSet& data, int step) {
+  EXPECT_EQ(data.GetNumberOfPoints(), 5 * 4 * 5);  // The points where zones meet are merged.
+  EXPECT_EQ(data.GetNumberOfCells(), 4 * 3 * 4);
+  vtkDataArray* const read = data.GetPointData()->GetArray("Velocity");
+  ASSERT_NE(read, nullptr);
+  ASSERT_EQ(read->GetNumberOfComponents(), 3);
+  for (vtkIdType i = 0; i < data.GetNumberOfPoints(); ++i)
+    for (int component = 0; component < 3; ++component)
+      EXPECT_EQ(read->GetComponent(i, component), velocity(data.GetPoint(i), component, step));
+}
+
+TEST(Cgns, ZonesAreOneMeshInBothFormats) {
+  const TemporaryFolder folder;
+  for (const int type : {CG_FILE_ADF, CG_FILE_HDF5}) {
+    write_cgns(folder / "a.cgns", type, 1);
+    EXPECT_EQ(time_steps(folder / "a.cgns"), 1);
+    expect_velocity(*read_vtk_source(folder / "a.cgns"), 0);
+    std::filesystem::remove(folder / "a.cgns");
+  }
+}
+
+TEST(Cgns, HasStepsOfTime) {
+  const TemporaryFolder folder;
+  write_cgns(folder / "a.cgns", CG_FILE_HDF5, 3);
+  EXPECT_EQ(time_steps(folder / "a.cgns"), 3);
+  expect_velocity(*read_vtk_source(folder / "a.cgns", 0), 0);
+  expect_velocity(*read_vtk_source(folder / "a.cgns", 1), 1);
+  expect_velocity(*read_vtk_source(folder / "a.cgns"), 2);
+  EXPECT_THROW(read_vtk_source(folder / "a.cgns", 3), std::invalid_argument);
+}
+
+TEST(Cgns, DamageIsOneLine) {
+  const TemporaryFolder folder;
+  write_bytes(folder / "none.cgns", "no CGNS");
+  EXPECT_NE(read_error(folder / "none.cgns").find("none.cgns"), std::string::npos);
+  write_cgns(folder / "a.cgns", CG_FILE_HDF5, 1);
+  std::filesystem::resize_file(folder / "a.cgns", std::filesystem::file_size(folder / "a.cgns") / 2);
+  EXPECT_NE(read_error(folder / "a.cgns").find("a.cgns"), std::string::npos);
 }
 
 }  // namespace

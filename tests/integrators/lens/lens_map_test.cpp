@@ -1,10 +1,4 @@
-// Compares parallel light that goes from plane to plane with closed forms.
-
-#include <cmath>
 #include <complex>
-
-#include <Eigen/LU>
-#include <gtest/gtest.h>
 
 #include "base/constants.h"
 #include "integrators/lens/lens.h"
@@ -13,12 +7,6 @@
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Matrix2d;
-using Eigen::Matrix3d;
-using Eigen::Vector2d;
-using Eigen::Vector3d;
 
 const Vector3d down(0, 0, -1), up(0, 0, 1);
 

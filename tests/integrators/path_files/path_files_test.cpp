@@ -1,27 +1,15 @@
 #include "integrators/path_files/path_files.h"
 
 #include <array>
-#include <cmath>
-#include <cstdio>
 #include <cstring>
-#include <functional>
 #include <limits>
-#include <random>
 #include <stdexcept>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "tests/renderer/support.h"
 #include "tests/tracing/path_support.h"
 
 namespace tensorray {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
 /// Reads a file of these bytes. Nothing may be written to the terminal meanwhile.
 /// @return the error's message; empty if it was read.

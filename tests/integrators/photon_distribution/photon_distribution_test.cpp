@@ -1,19 +1,16 @@
 #include "integrators/photon_distribution/photon_distribution.h"
 
-#include <cmath>
+#include <cstring>
+#include <memory>
+#include <optional>
 
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
-
+#include "integrators/photon_distribution/photon_chunks.h"
+#include "tests/base/rank_support.h"
 #include "tests/tracing/support.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 
 /// A cube in parallel light along −z, and a plate behind it.
 struct Bench {
@@ -76,36 +73,6 @@ TEST(PhotonDistribution, EveryRayIsAccountedFor) {
       EXPECT_NEAR(on_film, deposited, 1e-9 * deposited);
     }
     EXPECT_NEAR(static_cast<double>(light.positions) * light.ray_area, 4, 1e-9);  // The beam's cross section.
-  }
-}
-
-TEST(PhotonDistribution, IsTheSameOnAnyNumberOfThreadsAndForTheSameSeed) {
-  const Bench bench = Bench::make(linear_tensor, 2.5, 48);
-  PhotonSettings settings;
-  settings.photons = 5000;  // More than one chunk.
-  settings.seed = 11;
-  settings.channels_per_photon = 2;
-  settings.keep_photons = true;
-  for (const BeamPattern pattern :
-       {BeamPattern::grid, BeamPattern::stratified, BeamPattern::sobol, BeamPattern::random}) {
-    settings.pattern = pattern;
-    settings.density.kind = pattern == BeamPattern::sobol ? DensityKind::photon_differential : DensityKind::gaussian;
-    const auto on_threads = [&](int threads) {
-      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-      return distribute(bench, channels(4), settings);
-    };
-    const PhotonDistribution one = on_threads(1);
-    for (const int threads : {2, 8}) {
-      const PhotonDistribution many = on_threads(threads);
-      EXPECT_EQ(one.irradiance.values, many.irradiance.values);
-      EXPECT_EQ(one.ends, many.ends);
-      EXPECT_EQ(one.tensor_samples, many.tensor_samples);
-      ASSERT_EQ(one.photons.size(), many.photons.size());
-      for (std::size_t i = 0; i < one.photons.size(); ++i) ASSERT_EQ(one.photons[i].position, many.photons[i].position);
-    }
-    PhotonSettings other = settings;
-    other.seed = 12;
-    EXPECT_NE(one.irradiance.values, distribute(bench, channels(4), other).irradiance.values);
   }
 }
 
@@ -193,6 +160,134 @@ TEST(PhotonDistribution, StopsWhenCancelledAndReportsProgress) {
     if (done > 0) progress.cancelled = true;
   };
   EXPECT_THROW(distribute_photons(bench.field, bench.geometry, bench.beam, channels(1), settings, progress), Cancelled);
+}
+
+// Photons that are traced in parts, by ranks and in several runs: the result is that of one process.
+
+const std::vector<LightChannel>& unit_channels() {
+  static const std::vector<LightChannel> four{{0.1, 650, 0.3}, {0.2, 600, 0.2}, {0.3, 550, 0.1}, {0.4, 450, 0.4}};
+  return four;
+}
+
+struct SharedBench {
+  TensorField field = cube_field(9, linear_tensor);
+  Geometry geometry{surfaces()};
+  Beam beam = silhouette_beam(field.corners(), {0, 0, -1}, Vector3d::UnitY());
+
+  Surfaces surfaces() const {
+    Surfaces surfaces = surfaces_of(field);
+    surfaces.plate = plate_across({0, 0, -1}, 1.5);
+    surfaces.plate->size = {2.5, 2.5};
+    surfaces.plate->resolution = {24, 24};
+    return surfaces;
+  }
+};
+
+const SharedBench& bench() {
+  static const SharedBench one;
+  return one;
+}
+
+/// Light that has seven chunks.
+PhotonSettings settings_of(DensityKind kind) {
+  PhotonSettings settings;
+  settings.bending.step = 2;
+  settings.photons = 400000;
+  settings.channels_per_photon = 1;
+  settings.density.kind = kind;
+  settings.keep_photons = true;
+  settings.fluence = FluenceKind::bands;
+  return settings;
+}
+
+PhotonDistribution distribute(PhotonSettings settings, Job* job = nullptr, const Progress& progress = {}) {
+  settings.job = job;
+  return distribute_photons(bench().field, bench().geometry, bench().beam, unit_channels(), settings, progress);
+}
+
+void expect_same(const PhotonDistribution& a, const PhotonDistribution& b) {
+  EXPECT_TRUE(a.irradiance.values == b.irradiance.values);
+  EXPECT_EQ(a.ends, b.ends);
+  EXPECT_EQ(a.positions, b.positions);
+  EXPECT_EQ(a.ray_steps, b.ray_steps);
+  EXPECT_EQ(a.tensor_samples, b.tensor_samples);
+  ASSERT_EQ(a.photons.size(), b.photons.size());
+  EXPECT_TRUE(a.photons.empty() ||
+              std::memcmp(a.photons.data(), b.photons.data(), a.photons.size() * sizeof a.photons[0]) == 0);
+  ASSERT_EQ(a.fluence.size(), b.fluence.size());
+  for (std::size_t grid = 0; grid < a.fluence.size(); ++grid) {
+    ASSERT_EQ(a.fluence[grid].blocks.size(), b.fluence[grid].blocks.size());
+    for (std::size_t block = 0; block < a.fluence[grid].blocks.size(); ++block) {
+      EXPECT_EQ(a.fluence[grid].blocks[block].origin, b.fluence[grid].blocks[block].origin);
+      EXPECT_EQ(a.fluence[grid].blocks[block].values, b.fluence[grid].blocks[block].values);
+    }
+  }
+}
+
+/// What a run keeps that is ended at its first picture.
+Results interrupted(PhotonSettings settings) {
+  Job job;
+  job.picture_wanted = true;
+  Progress progress;
+  settings.show = [&](const PhotonDistribution&) { progress.cancelled = true; };
+  EXPECT_THROW(distribute(settings, &job, progress), Cancelled);
+  EXPECT_EQ(job.results().size(), 1u);
+  return job.results();
+}
+
+TEST(KeptPhotons, WantTheOutputsOfTheirBeginning) {
+  const PhotonSettings all = settings_of(DensityKind::histogram);
+  PhotonSettings fewer = all, unbanded = all;
+  fewer.keep_photons = false;
+  fewer.fluence = FluenceKind::none;
+  PhotonSettings colored = fewer;
+  colored.colors.assign(4, {0.5, 0.2, 0.1});  // As many values for a pixel as channels.
+  unbanded.fluence = FluenceKind::all_light;
+  const Results of_all = interrupted(all), of_fewer = interrupted(fewer);
+  Job more({}, of_all);
+  expect_same(distribute(fewer, &more), distribute(fewer));
+  const auto expect_refused = [](const PhotonSettings& settings, const Results& results) {
+    Job job({}, results);
+    EXPECT_THROW(distribute(settings, &job), DamagedArchive);
+  };
+  expect_refused(all, of_fewer);
+  expect_refused(colored, of_fewer);
+  expect_refused(unbanded, of_all);
+  expect_refused(all, {{of_all.begin()->first, std::make_shared<const std::string>("damaged")}});
+}
+
+double sum_of(const Film& film) {
+  double sum = 0;
+  for (const double value : film.values) sum += value;
+  return sum;
+}
+
+/// Random positions fill the whole beam at once: the picture so far is as bright as the whole. Rows do not.
+TEST(KeptPhotons, PicturesSoFarAreAsBrightAsTheirLight) {
+  PhotonSettings settings = settings_of(DensityKind::gaussian);
+  for (const BeamPattern pattern : {BeamPattern::random, BeamPattern::stratified}) {
+    settings.pattern = pattern;
+    Job job;
+    std::optional<PhotonDistribution> first;
+    settings.show = [&](PhotonDistribution so_far) { first = std::move(so_far); };
+    job.picture_wanted = true;
+    const PhotonDistribution all = distribute(settings, &job);
+    ASSERT_TRUE(first);
+    const double part = static_cast<double>(first->positions) / static_cast<double>(all.positions);
+    EXPECT_LT(part, 0.5);
+    EXPECT_GT(first->photons.size(), 0u);
+    if (pattern == BeamPattern::random)
+      EXPECT_NEAR(sum_of(first->irradiance) / sum_of(all.irradiance), 1, 0.02);
+    else
+      EXPECT_LT(sum_of(first->irradiance), 0.6 * sum_of(all.irradiance));
+  }
+}
+
+TEST(KeptPhotons, OfOtherWorkAreRefused) {
+  StrangeRanks ranks;
+  Job job;
+  job.ranks = &ranks;
+  EXPECT_THROW(distribute(settings_of(DensityKind::histogram), &job), DamagedArchive);
 }
 
 }  // namespace

@@ -1,15 +1,12 @@
 #include "integrators/seeds/seeds.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
-#include <gtest/gtest.h>
+#include "tests/renderer/support.h"
+#include "tests/tracing/support.h"
 
 namespace tensorray {
 namespace {
-
-using Eigen::Vector3d;
 
 /// A slanted view of a cube: its aperture is a hexagon.
 Beam hexagonal_beam() {
@@ -94,6 +91,116 @@ TEST(Seeds, ASphereIsFilledEvenly) {
   // An eighth of the volume is within half the radius, and an elementary interval of the sequence.
   EXPECT_EQ(inner, 512);
   EXPECT_LT(mean.norm(), 0.01);  // Independent points: 2 √(3/5) / √4096 = 0.024.
+}
+
+SeedList read_text(const std::string& text) {
+  const Temporary file("seeds.txt", text);
+  return read_seeds(file.path());
+}
+
+TEST(SeedFiles, HoldPointsInText) {
+  const SeedList seeds = read_text("# a comment\n\n1 2.5 -3e-1\n\t+4,5;6 # and another\r\n7, 8, 9");
+  EXPECT_EQ(seeds.positions, (std::vector<Vector3d>{{1, 2.5, -0.3}, {4, 5, 6}, {7, 8, 9}}));
+  EXPECT_TRUE(seeds.directions.empty());
+}
+
+TEST(SeedFiles, MayHaveDirectionsAndAHeader) {
+  const SeedList seeds = read_text("\xef\xbb\xbfx,y,z,dx,dy,dz\n1,2,3,0,0,-2\n4,5,6,3e200,4e200,0\n");
+  EXPECT_EQ(seeds.positions, (std::vector<Vector3d>{{1, 2, 3}, {4, 5, 6}}));
+  ASSERT_EQ(seeds.directions.size(), 2u);
+  EXPECT_EQ(seeds.directions[0], Vector3d(0, 0, -1));
+  EXPECT_LT((seeds.directions[1] - Vector3d(0.6, 0.8, 0)).norm(), 1e-15);
+}
+
+TEST(SeedFiles, LinesEndAsOnAnySystem) {
+  for (const std::string end : {"\n", "\r", "\r\n"}) {
+    const SeedList seeds = read_text("# text" + end + "1 2 3" + end + end + "4 5 6" + end);
+    EXPECT_EQ(seeds.positions, (std::vector<Vector3d>{{1, 2, 3}, {4, 5, 6}})) << seeds.positions.size();
+    const std::string said = message([&] { read_text("1 2 3" + end + end + "4 five 6" + end); });
+    EXPECT_NE(said.find("line 3: "), std::string::npos) << said;
+  }
+}
+
+TEST(SeedFiles, ErrorsAreShortLines) {
+  for (const std::string& word : {std::string(5000000, 'x'), std::string("a\0b\x1b[31m", 8)}) {
+    const std::string said = message([&] { read_text("1 2 3\n1 2 " + word + "\n"); });
+    EXPECT_LT(said.size(), 300u);
+    EXPECT_EQ(said.find('\0'), std::string::npos);
+    EXPECT_EQ(said.find('\x1b'), std::string::npos);
+  }
+}
+
+TEST(SeedFiles, SayWhichLineIsWrong) {
+  const auto complaint = [](const std::string& text) { return message([&] { read_text(text); }); };
+  const auto expect = [&](const std::string& text, const std::string& words) {
+    const std::string said = complaint(text);
+    EXPECT_NE(said.find("seeds.txt: "), std::string::npos) << said;
+    EXPECT_NE(said.find(words), std::string::npos) << said;
+  };
+  expect("1 2 3\n4 5\n", "line 2: a seed is three numbers (x y z), or six (x y z and a direction), not 2");
+  expect("1 2 3\n1 2 3 0 0 1\n", "line 2: all lines must have the same number of values: the lines above have 3");
+  expect("1 2 3\n4 five 6\n", "line 2: \"five\" is not a finite number");
+  expect("1 2 nan\n", "line 1: \"nan\" is not a finite number");
+  expect("1 2 3 0 0 0\n", "line 1: the direction has length zero");
+  expect("x y z\na b c\n", "line 2: \"a\" is not a finite number");
+  expect("x,y,z\n", "contains no seeds");
+  expect("# nothing\n", "contains no seeds");
+  EXPECT_NE(message([] { read_seeds("/nowhere/seeds.csv"); }).find("/nowhere/seeds.csv"), std::string::npos);
+}
+
+/// A tensor with the trace x + 2 z.
+Matrix3d traced(const Vector3d& p) { return Vector3d(p.x(), p.z(), p.z()).asDiagonal(); }
+
+Threshold trace_from(double min, double max = 1e300) { return {Invariant::trace, min, max}; }
+
+TEST(ThresholdSeeds, AreWhereTheTensorIsWanted) {
+  const TensorField field = cube_field(9, traced);
+  for (const Vector3d& p : threshold_seeds(field, trace_from(1.5, 2), 500, 1)) {
+    EXPECT_TRUE(field.contains(p));
+    EXPECT_GE(p.x() + 2 * p.z(), 1.5 - 1e-6);
+    EXPECT_LE(p.x() + 2 * p.z(), 2 + 1e-6);
+  }
+}
+
+TEST(ThresholdSeeds, AreEvenlySpread) {
+  // The seeds fill the half of a cube with x + 2 z > 0. The parts on either side of y = 0 and of x + 2 z = 1 / 2 have
+  // seeds in proportion to their volumes. The tolerance is one standard deviation of independent points: 32 at a half
+  // of 4096.
+  const TensorField field = cube_field(9, traced);
+  const std::vector<Vector3d> seeds = threshold_seeds(field, trace_from(0), 4096, 7);
+  int right = 0, inner = 0;
+  for (const Vector3d& p : seeds) {
+    right += p.y() > 0;
+    inner += p.x() + 2 * p.z() < 0.5;
+  }
+  EXPECT_NEAR(right, 2048, 32);
+  EXPECT_NEAR(inner, 4096 / 4, 32);  // In the cube, the probability density of x + 2 z is 1/4 up to 1.
+}
+
+TEST(ThresholdSeeds, StayInATurnedField) {
+  const Eigen::Affine3d placement(Eigen::Translation3d(3, -1, 2) *
+                                  Eigen::AngleAxisd(0.6, Vector3d(1, 2, 3).normalized()));
+  const TensorField field = cube_field(9, traced, placement);
+  for (const Vector3d& p : threshold_seeds(field, trace_from(-1e300), 300, 1)) EXPECT_TRUE(field.contains(p));
+}
+
+TEST(ThresholdSeeds, AreTheSameAgainAndDependOnTheSeed) {
+  const TensorField field = cube_field(9, traced);
+  const auto seeds = threshold_seeds(field, trace_from(1), 200, 3);
+  ASSERT_EQ(seeds.size(), 200u);
+  EXPECT_EQ(seeds, threshold_seeds(field, trace_from(1), 200, 3));
+  EXPECT_NE(seeds, threshold_seeds(field, trace_from(1), 200, 4));
+  const auto fewer = threshold_seeds(field, trace_from(1), 20, 3);
+  EXPECT_EQ(fewer, std::vector<Vector3d>(seeds.begin(), seeds.begin() + 20));
+}
+
+TEST(ThresholdSeeds, SaysWhatValuesThereAreWhenNoneIsWanted) {
+  const TensorField field = constant_field(2 * Matrix3d::Identity());
+  EXPECT_EQ(message([&] { threshold_seeds(field, trace_from(7, 8), 10, 1); }),
+            "only 0 of 10 seeds found where the threshold wants values from 7 to 8: in the box they are from 6 to 6; "
+            "widen the threshold, or ask for fewer seeds");
+  EXPECT_THROW(threshold_seeds(field, trace_from(0), 0, 1), std::invalid_argument);
+  EXPECT_THROW(threshold_seeds(field, trace_from(2, 1), 1, 1), std::invalid_argument);
 }
 
 }  // namespace

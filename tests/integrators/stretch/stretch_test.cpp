@@ -2,22 +2,12 @@
 
 #include "integrators/stretch/stretch.h"
 
-#include <cmath>
-
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
-
 #include "base/constants.h"
 #include "tests/tracing/support.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 StretchSettings along_minus_z(double length, double flexibility = 1) {
   StretchSettings settings;

@@ -1,15 +1,15 @@
 // An import that fails prints one line and changes no file.
 
+#include <cstdlib>
 #include <functional>
 
 #include <sys/stat.h>
 
 #include "tests/program/import_support.h"
+#include "tests/program/support.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
 
 using ImportErrors = Import;
 
@@ -41,10 +41,8 @@ TEST_F(ImportErrors, OutputsThatAreInputsByALink) {
   refuses({"field.vti", "--boundary", "link.ply"}, 2,
           {"--boundary", "link.ply", "the same file as the file to import"});
   const auto before = files();
-  const Outcome outcome = run({"import", "field.vti", "-q", "-o", "link.vdb"});
-  EXPECT_EQ(outcome.status, 2);
-  EXPECT_NE(outcome.error.find("-o (link.vdb) is the same file as the file to import"), std::string::npos)
-      << outcome.error;
+  expect_error("-o (link.vdb) is the same file as the file to import", {"import", "field.vti", "-q", "-o", "link.vdb"},
+               2);
   EXPECT_EQ(read_file(in_folder("field.vti")), image());
   EXPECT_EQ(files(), before);
 }
@@ -69,14 +67,13 @@ TEST_F(ImportErrors, WrongArguments) {
   for (const char* const file : {"image.vti", "array.npy"})
     refuses({file, "--levels", "2"}, 2, {file, "--levels", "one size"});
   refuses({"image.vti", "--bounds", "1", "0", "0", "1", "0", "1"}, 2, {"--bounds"});
+  refuses({"image.vti", "--origin", "0", "0", "0"}, 2, {"image.vti", "leave --origin out"});
   refuses({"image.vti", "--boundary", "body.stl"}, 2, {"--boundary", ".ply"});
   refuses({"image.vti", "-o", "image.txt"}, 2, {"--output"});
   write("array.npy", npy());
   refuses({"array.npy", "--resolution", "8"}, 2, {"array.npy", "--resolution"});
   refuses({"array.npy", "--memory", "-1"}, 2, {"--memory"});
-  const Outcome elsewhere = run({"import", "image.vti", "-q", "-o", "missing/image.vdb"});
-  EXPECT_EQ(elsewhere.status, 1);
-  EXPECT_NE(elsewhere.error.find("missing"), std::string::npos) << elsewhere.error;
+  expect_error("missing", {"import", "image.vti", "-q", "-o", "missing/image.vdb"}, 1);
 }
 
 /// Numbers that a file or a user may give, and that OpenVDB refuses, or writes and does not read; and no voxels.
@@ -92,9 +89,7 @@ TEST_F(ImportErrors, VoxelsThatAreNowhere) {
 TEST_F(ImportErrors, AFullDiskLeavesWhatWasThere) {
   write("array.npy", npy());
   write("old.vdb", " BDV, which was there before");
-  const Outcome outcome = run({"import", "array.npy", "-q", "-o", "old.vdb"}, 16);
-  EXPECT_EQ(outcome.status, 1);
-  EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  expect_one_line(run({"import", "array.npy", "-q", "-o", "old.vdb"}, 16), "", 1);
   EXPECT_EQ(read_file(in_folder("old.vdb")), " BDV, which was there before");
   EXPECT_EQ(files(), (std::vector<std::string>{"array.npy", "old.vdb"}));
 }
@@ -106,9 +101,7 @@ TEST_F(ImportErrors, DataThatTheInputNamesAreNotReplaced) {
   write("a.nhdr",
         "NRRD0004\ntype: float\ndimension: 4\nsizes: 9 2 2 2\nkinds: 3D-matrix space space space\nendian: little\n"
         "encoding: raw\ndata file: data.vdb\n");
-  const Outcome outcome = run({"import", "a.nhdr", "-o", "data.vdb"});
-  EXPECT_EQ(outcome.status, 2) << outcome.error;
-  EXPECT_NE(outcome.error.find("data.vdb: is there, and is no OpenVDB file"), std::string::npos) << outcome.error;
+  expect_error("data.vdb: is there, and is no OpenVDB file", {"import", "a.nhdr", "-o", "data.vdb"}, 2);
   EXPECT_TRUE(read_file(in_folder("data.vdb")) == numbers);
   run_well({"import", "a.nhdr", "-q", "-o", "b.vdb"});
   run_well({"import", "a.nhdr", "-q", "-o", "b.vdb"});
@@ -166,10 +159,8 @@ sys.exit(status)')",
 TEST_F(ImportProcess, AReaderThatCrashesIsOneLine) {
   if (!std::filesystem::exists(fmt::format("/proc/{0}/task/{0}/children", getpid())))
     GTEST_SKIP() << "this system does not tell a process's children";
-  const Outcome outcome = import_until([](pid_t, pid_t reader) { kill(reader, SIGABRT); });
-  EXPECT_EQ(outcome.status, 1);
-  EXPECT_NE(outcome.error.find("large.npy: reading it ended the reader"), std::string::npos) << outcome.error;
-  EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  expect_one_line(import_until([](pid_t, pid_t reader) { kill(reader, SIGABRT); }),
+                  "large.npy: reading it ended the reader", 1);
   EXPECT_EQ(files(), std::vector<std::string>{"large.npy"});
 }
 
@@ -217,6 +208,183 @@ TEST_F(ImportProcess, OfWhatIsKeptInFilesGivesTheSameFile) {
   expect_same({"cube.npy"});
   write("cube.vti", image());
   expect_same({"cube.vti", "--resolution", "48"});
+}
+
+// Files that announce what they do not have, or that name pipes: one line, in a time that a user waits, and no more
+// memory than there is.
+
+class HostileFiles : public Import {
+ protected:
+  /// A pipe that nobody writes to: to open it would wait for ever.
+  void make_pipe(const std::string& name) const {
+    std::filesystem::create_directories(in_folder(name).parent_path());
+    ASSERT_EQ(mkfifo(in_folder(name).c_str(), 0600), 0);
+  }
+
+  void write_in_folders(const std::string& name, const std::string& text) const {
+    std::filesystem::create_directories(in_folder(name).parent_path());
+    write(name, text);
+  }
+
+  /// Expects an error of one line with the file's name and a part, of a process whose data may take 2 GB: more for the
+  /// address sanitizer, which reserves terabytes.
+  void refuses_soon(const std::string& name, const std::string& part = "") const {
+    const Outcome outcome = wait_for(start_in(limit_, {"import", "-q", "-o", "f.vdb", name}));
+    EXPECT_TRUE(outcome.status == 1 || outcome.status == 2) << name << ": " << outcome.status << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+    for (const std::string& each : {name, part})
+      EXPECT_NE(outcome.error.find(each), std::string::npos) << name << outcome.error;
+    EXPECT_FALSE(std::filesystem::exists(in_folder("f.vdb")));
+  }
+
+ private:
+#ifdef TENSORRAY_SANITIZED
+  const std::string limit_ = "exec";
+#else
+  const std::string limit_ = "ulimit -d 2000000; exec";
+#endif
+};
+
+std::string xml(const std::string& type, const std::string& contents) {
+  return "<?xml version=\"1.0\"?><VTKFile type=\"" + type +
+         "\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">" + contents + "</VTKFile>";
+}
+
+std::string legacy(const std::string& data_set, const std::string& points) {
+  return "# vtk DataFile Version 3.0\nx\nASCII\nDATASET " + data_set + "\n" + points;
+}
+
+const std::string legacy_image = "STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1";
+const std::string legacy_mesh = "UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1";
+
+/// Files that name pipes or devices, that announce billions of numbers, points or cells in less than 2 kB, whose mesh
+/// is implied, so that what looks at all its points would take days, or that grow when they are read.
+TEST_F(HostileFiles, AreRefusedSoon) {
+  make_pipe("pipe");
+  const std::string nrrd = "NRRD0004\ntype: float\ndimension: 4\nsizes: 6 2 2 2\nencoding: raw\nendian: little\n";
+  const std::string huge =
+      "<ImageData WholeExtent=\"0 99999 0 99999 0 99999\" Origin=\"0 0 0\" Spacing=\"1 1 1\">"
+      "<Piece Extent=\"0 99999 0 99999 0 99999\"/></ImageData>";
+  for (const char* name : {"a.vti", "b.vti"}) write(name, xml("ImageData", huge));
+  const std::string grid =
+      "<Grid><Topology TopologyType=\"3DCoRectMesh\" Dimensions=\"100000 100000 100000\"/><Geometry "
+      "GeometryType=\"ORIGIN_DXDYDZ\"><DataItem Dimensions=\"3\">0 0 0</DataItem><DataItem Dimensions=\"3\">1 1 "
+      "1</DataItem></Geometry></Grid>";
+  std::string doubled, nested;
+  for (int i = 0; i < 27; ++i) {
+    const std::string next = fmt::format("<xi:include xpointer=\"xpointer(//Grid[@Name='g{}'])\"/>", i + 1);
+    doubled += fmt::format("<Grid Name=\"g{}\" GridType=\"{}\">", i, i == 26 ? "Uniform" : "Tree") +
+               (i == 26 ? "" : next + next) + "</Grid>";
+  }
+  for (int i = 0; i < 150; ++i) nested += "<A>";
+  nested += "<DataItem Dimensions=\"1\">1</DataItem>";
+  for (int i = 0; i < 150; ++i) nested += "</A>";
+  struct Case {
+    const char *name, *part;
+    std::string text;
+  };
+  const std::vector<Case> all{
+      {"a.nhdr", "", nrrd + "data file: pipe\n"},
+      {"zero.nhdr", "", nrrd + "line skip: 5\ndata file: /dev/zero\n"},
+      {"a.vtm", "pipe",
+       xml("vtkMultiBlockDataSet",
+           "<vtkMultiBlockDataSet><DataSet index=\"0\" file=\"pipe\"/></vtkMultiBlockDataSet>")},
+      {"a.pvd", "pipe",
+       xml("Collection", "<Collection><DataSet timestep=\"0\" part=\"0\" file=\"pipe\"/></Collection>")},
+      {"a.pvti", "pipe",
+       xml("PImageData",
+           "<PImageData WholeExtent=\"0 1 0 1 0 1\"><Piece Extent=\"0 1 0 1 0 1\" Source=\"pipe\"/></PImageData>")},
+      {"scalars.vtk", "",
+       legacy(legacy_image, "POINT_DATA 8\nSCALARS s float 2000000000\nLOOKUP_TABLE default\n1 2 3\n")},
+      {"array.vtk", "", legacy(legacy_image, "POINT_DATA 8\nFIELD f 1\na 2000000000 2000000000 float\n1 2 3\n")},
+      {"cells.vtk", "", legacy(legacy_mesh, "CELLS 2000000000 2000000000\n4 0 1 2 3\n")},
+      {"points.vtk", "", legacy("UNSTRUCTURED_GRID", "POINTS 2000000000 float\n0 0 0\n")},
+      {"two.vtm", "",
+       xml("vtkMultiBlockDataSet",
+           "<vtkMultiBlockDataSet><DataSet index=\"0\" file=\"a.vti\"/><DataSet index=\"1\" file=\"b.vti\"/>"
+           "</vtkMultiBlockDataSet>")},
+      {"two.xdmf", "",
+       "<Xdmf><Domain><Grid GridType=\"Collection\" CollectionType=\"Spatial\">" + grid + grid +
+           "</Grid></Domain></Xdmf>"},
+      {"doubled.xdmf", "", "<Xdmf><Domain>" + doubled + "</Domain></Xdmf>"},
+      {"paths.xdmf", "",
+       "<Xdmf><Domain>" + nested +
+           "<Grid><Topology TopologyType=\"3DSMesh\" Dimensions=\"2 2 2\"/><Geometry><DataItem "
+           "Reference=\"//A//A//A//A//A//A//A//A\"/></Geometry></Grid></Domain></Xdmf>"}};
+  for (const Case& each : all) {
+    write(each.name, each.text);
+    refuses_soon(each.name, each.part);
+  }
+}
+
+TEST_F(HostileFiles, OfEnSight) {
+  make_pipe("pipe");
+  make_pipe("p.0001");
+  write("a.geo", "text\n");
+  const std::string format = "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: ";
+  for (const std::string entry :
+       {"pipe\n", "a.geo\nmeasured: pipe\n", "a.geo\nVARIABLE\ncomplex scalar per node: p a.geo pipe 1\n",
+        "a.geo\nVARIABLE\nscalar per measured node: 1 p p.****\n"}) {
+    write("a.case", format + entry);
+    expect_error("a pipe or a device", {"import", "-q", "-o", "f.vdb", "a.case"}, 1);
+  }
+  const std::string head = "a\nb\nnode id off\nelement id off\npart\n1\nx\n";
+  const std::string points = "coordinates\n8\n0\n1\n0\n1\n0\n1\n0\n1\n0\n0\n1\n1\n0\n0\n1\n1\n0\n0\n0\n0\n1\n1\n1\n1\n";
+  write("a.case", format + "a.geo\n");
+  for (const std::string count : {"coordinates\n2000000000\n", "hexa8\n1000000000\n", "nfaced\n2000000000\n",
+                                  "block uniform\n1000000 1000000 1000000\n"}) {
+    write("a.geo", head + (count[0] == 'h' || count[0] == 'n' ? points : "") + count + "0\n0\n0\n1\n1\n1\n");
+    expect_error("tensorray: ", {"import", "-q", "-o", "f.vdb", "a.case"});
+  }
+  write("b.case", format + "a.geo\nTIME\ntime set: 1\nnumber of steps: 2000000000\n");
+  refuses_soon("b.case", "million");
+}
+
+TEST_F(HostileFiles, PipesInCasesOfOpenFoam) {
+  const auto is_refused = [&](const std::string& pipe) {
+    write_in_folders("case/system/controlDict", "x");
+    for (const char* name : {"points", "faces", "owner", "neighbour"})
+      write_in_folders(std::string("case/constant/polyMesh/") + name, "x");
+    write_in_folders("case/1/p", "x");
+    make_pipe("case/" + pipe);
+    refuses_soon("case", pipe + ": is a pipe or a device");
+    std::filesystem::remove_all(in_folder("case"));
+  };
+  for (const char* pipe : {"constant/polyMesh/boundary", "1/U", "1/lagrangian/cloud/positions"}) is_refused(pipe);
+}
+
+// Where `tensorray-import` is not built: all that needs no VTK works, and the rest says what to do.
+
+class WithoutImport : public Program {
+ protected:
+  /// Runs a copy of the program, beside which nothing lies.
+  Outcome run_alone(const std::string& arguments) const {
+    const std::filesystem::path alone = in_folder("bin") / "tensorray";
+    std::filesystem::create_directories(alone.parent_path());
+    std::filesystem::copy_file(TENSORRAY_BINARY, alone, std::filesystem::copy_options::skip_existing);
+    const int status = std::system(
+        ("cd '" + in_folder("").string() + "' && bin/tensorray " + arguments + " > stdout 2> stderr").c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(in_folder("stdout")),
+            read_file(in_folder("stderr"))};
+  }
+};
+
+TEST_F(WithoutImport, TheErrorSaysHowToBuildIt) {
+  write("scene.json", small_scene());
+  write("a.vtu", "");
+  write("lines.vtp", "<VTKFile/>");
+  for (const std::string arguments :
+       {"import a.vtu -o a.vdb",
+        "render scene.json -q --set integrator.type=path_tracing --set integrator.paths=lines.vtp -o a.png"}) {
+    expect_one_line(run_alone(arguments), "`tools/setup release import`", 1);
+  }
+}
+
+TEST_F(WithoutImport, PicturesAreRenderedAndVtkFilesWritten) {
+  write("scene.json", small_scene());
+  const Outcome outcome = run_alone("render scene.json -q -o a.png -o photons.vtp");
+  EXPECT_EQ(outcome.status, 0) << outcome.error;
+  for (const char* file : {"a.png", "photons.vtp"}) EXPECT_TRUE(std::filesystem::exists(in_folder(file))) << file;
 }
 
 }  // namespace

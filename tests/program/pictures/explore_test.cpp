@@ -1,15 +1,11 @@
 // `tensorray explore`: a sheet of pictures of a field, and the scene of one of them.
 
-#include <algorithm>
-#include <cmath>
-
 #include "renderer/images/image.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
 namespace {
 
-using namespace test;
 using nlohmann::json;
 
 constexpr int size = 32, gap = 8, columns = 6;

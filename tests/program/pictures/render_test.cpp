@@ -1,5 +1,5 @@
-#include <algorithm>
-#include <cmath>
+
+#include <fmt/format.h>
 
 #include "renderer/images/image.h"
 #include "tests/program/support.h"
@@ -7,7 +7,7 @@
 namespace tensorray {
 namespace {
 
-using namespace test;
+using nlohmann::json;
 
 TEST_F(Program, WritesPictureAndExrBesideTheScene) {
   write("scene.json", small_scene());
@@ -18,26 +18,24 @@ TEST_F(Program, WritesPictureAndExrBesideTheScene) {
   const Image exr = read_image(in_folder("scene.exr"));
   EXPECT_EQ(exr.width, 32);
   EXPECT_EQ(exr.channels, (std::vector<std::string>{"R", "G", "B"}));
+  const Outcome quiet = run_well({"render", "scene.json", "--quiet"});
+  EXPECT_EQ(quiet.out + quiet.error, "");
 }
 
-TEST_F(Program, QuietPrintsNothing) {
-  write("scene.json", small_scene());
-  const Outcome outcome = run_well({"render", "scene.json", "--quiet"});
-  EXPECT_EQ(outcome.out + outcome.error, "");
-}
-
-/// Of all options, these change the bytes in no way, or in all.
+/// Of all options, these change the bytes in no way, or in all that is drawn at random.
 TEST_F(Program, ThreadsDoNotChangeTheFilesAndTheSeedDoes) {
   write("scene.json", small_scene());
-  const auto bytes = [&](const char* threads, const char* seed) {
-    run_well({"render", "scene.json", "-q", "-o", "out.exr", "-o", "out.png", "--threads", threads, "--seed", seed,
-              "--set", "light.pattern=random"});
-    return read_file(in_folder("out.exr")) + read_file(in_folder("out.png"));
-  };
-  const std::string one = bytes("1", "5");
-  EXPECT_TRUE(bytes("2", "5") == one);
-  EXPECT_TRUE(bytes("8", "5") == one);
-  EXPECT_FALSE(bytes("2", "6") == one);
+  for (const std::string change : {"light.pattern=stratified", "light.pattern=sobol", "light.pattern=random",
+                                   "light.pattern=grid", R"(integrator={"type":"lens","mode":"scatter"})"}) {
+    const auto bytes = [&](const char* threads, const char* seed) {
+      run_well({"render", "scene.json", "-q", "-o", "out.exr", "-o", "out.png", "--threads", threads, "--seed", seed,
+                "--set", change, "--set", "light.wavelengths.per_photon=1"});
+      return read_file(in_folder("out.exr")) + read_file(in_folder("out.png"));
+    };
+    const std::string one = bytes("1", "5");
+    EXPECT_TRUE(bytes("7", "5") == one) << change;
+    EXPECT_TRUE(bytes("7", "6") != one || change == "light.pattern=grid" || change[0] == 'i') << change;
+  }
 }
 
 TEST_F(Program, ProvenanceIsInTheHeader) {
@@ -82,6 +80,81 @@ TEST_F(Program, HelpAndVersion) {
   EXPECT_NE(run_well({"make", "vortex", "--help"}).out.find("--circulation"), std::string::npos);
   EXPECT_EQ(run_well({"--version"}).out.find("tensorray "), 0u);
   EXPECT_TRUE(nlohmann::json::parse(run_well({"schema"}).out).contains("$schema"));
+}
+
+// `tensorray render` of a field without a scene file, and the scene that it saves.
+
+class FieldAlone : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    run_well({"make", "point_load", "-o", "stress.vdb", "--resolution", "17"});
+  }
+
+  const std::vector<std::string> small_{"--set", "receiver.resolution=[24,24]", "--set", "light.wavelengths.count=4"};
+
+  std::vector<std::string> with_small(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.end(), small_.begin(), small_.end());
+    return arguments;
+  }
+};
+
+TEST_F(FieldAlone, IsRenderedWithDefaultsAndTheSceneIsToldAndSaved) {
+  std::filesystem::create_directory(in_folder("else where"));
+  const Outcome outcome =
+      run_well(with_small({"render", "stress.vdb", "-o", "alone.png", "--save-scene", "else where/stress.json"}));
+  EXPECT_NE(outcome.error.find("scene: {\"field\":"), std::string::npos) << outcome.error;
+  const json scene = read_json("else where/stress.json");
+  EXPECT_EQ(scene["integrator"]["type"], "photon_distribution");
+  EXPECT_EQ(scene["receiver"]["resolution"], json::array({24, 24}));
+  run_well({"render", "else where/stress.json", "-o", "again.png", "-q"});
+  const std::string picture = read_file(in_folder("alone.png"));
+  EXPECT_GT(picture.size(), 1000u);
+  // The pictures differ only in the name of the scene in their headers.
+  run_well(with_small({"render", "stress.vdb", "-o", "alone.exr", "-q"}));
+  run_well({"render", "else where/stress.json", "-o", "again.exr", "-q"});
+  EXPECT_EQ(read_image(in_folder("alone.exr")).pixels, read_image(in_folder("again.exr")).pixels);
+}
+
+TEST_F(FieldAlone, NothingIsOverwrittenOrMadeWrong) {
+  const std::string field = read_file(in_folder("stress.vdb"));
+  expect_error("--save-scene", {"render", "stress.vdb", "-q", "--save-scene", "stress.vdb"});
+  expect_error("--save-scene", {"render", "stress.vdb", "-q", "-o", "a.png", "--save-scene", "a.png"});
+  EXPECT_EQ(read_file(in_folder("stress.vdb")), field);
+  expect_error("nothing.vdb", {"render", "nothing.vdb", "-q"});
+  write("broken.vdb", "no field");
+  expect_error("broken.vdb", {"render", "broken.vdb", "-q"});
+  std::filesystem::create_directory(in_folder("scenes"));
+  write("scene.json", R"({ "field": { "file": "stress.vdb" }, "integrator": { "type": "photon_distribution" } })");
+  expect_error("must be in the folder of", {"render", "scene.json", "-q", "--save-scene", "scenes/scene.json"});
+  run_well(with_small({"render", "scene.json", "-q", "-o", "b.png", "--save-scene", "small.json"}));
+  EXPECT_EQ(read_json("small.json")["field"]["file"], "stress.vdb");
+}
+
+TEST_F(FieldAlone, FilesThatHaveToBeImportedAreRenderedAsTheyAreAfterAnImport) {
+  std::string numbers;
+  for (int i = 0; i < 5 * 5 * 5; ++i) numbers += fmt::format("{} 0 {} 2 0 3\n", i % 5, 0.3 * (i / 5 % 5));
+  write("tensors.nrrd",
+        "NRRD0005\ntype: float\ndimension: 4\nspace: right-anterior-superior\nsizes: 6 5 5 5\n"
+        "space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: 3D-symmetric-matrix space space space\n"
+        "encoding: ascii\n\n" +
+            numbers);
+  const Outcome outcome = run_well(with_small({"render", "tensors.nrrd", "--stats", "stats.json"}));
+  EXPECT_NE(outcome.error.find("light: along ["), std::string::npos) << outcome.error;
+  run_well({"import", "tensors.nrrd", "-o", "tensors.vdb", "-q"});
+  run_well(with_small({"render", "tensors.vdb", "-o", "after.exr", "-q"}));
+  EXPECT_EQ(read_image(in_folder("tensors.exr")).pixels, read_image(in_folder("after.exr")).pixels);
+  EXPECT_TRUE(exists(in_folder("tensors.png")));
+
+  expect_error("tensorray import", {"render", "tensors.nrrd", "--save-scene", "scene.json"});
+  expect_error("--stats", {"render", "tensors.nrrd", "--stats", "tensors.nrrd"});
+  expect_error("tensors.nrrd", {"render", "tensors.nrrd", "--array", "stress"});
+  expect_error("have to be imported", {"render", "stress.vdb", "--order", "vtk"});
+  expect_error("`tensorray import tensors.nrrd --array 'stress' -o FIELD.vdb`",
+               {"render", "tensors.nrrd", "--array", "stress", "--save-scene", "scene.json"});
+  expect_error("missing.nii.gz does not exist", {"render", "missing.nii.gz", "--order", "fsl"});
+  write("noise.vti", "noise");
+  expect_error("noise.vti", {"render", "noise.vti"});
 }
 
 }  // namespace

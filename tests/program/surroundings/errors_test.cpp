@@ -11,8 +11,6 @@
 namespace tensorray {
 namespace {
 
-using namespace test;
-
 class Errors : public Program {
  protected:
   /// Runs the program, which must fail with `status` and one line on standard error that matches `pattern`.

@@ -4,14 +4,11 @@
 #include <sys/stat.h>
 
 #include "scenes/jobs/work_file.h"
-#include "tests/data_folder.h"
 #include "tests/program/divided_scenes.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
 
 class KeptWork : public Program {
  protected:
@@ -109,6 +106,14 @@ TEST_P(DividedWork, ThatIsKilledContinuesToTheSameFiles) {
   run_well(render("a", {"--resume"}));
   expect_same("a");
   EXPECT_FALSE(has("a.png.checkpoint"));
+}
+
+TEST_P(DividedWork, IsTheSameOnAnyNumberOfThreads) {
+  make(GetParam());
+  for (const char* threads : {"1", "7"}) {
+    run_well(render("a", {"--threads", threads}));
+    expect_same("a");
+  }
 }
 
 TEST_P(DividedWork, OfShardsMergesToTheSameFiles) {

@@ -12,8 +12,6 @@
 namespace tensorray {
 namespace {
 
-using namespace test;
-
 std::string mpirun() {
 #ifdef TENSORRAY_MPIRUN
   return TENSORRAY_MPIRUN;

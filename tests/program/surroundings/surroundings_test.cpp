@@ -1,6 +1,6 @@
-// Places where a program can be put, and what each command makes of them: its result, or one line and no file.
+// Places where a program can be put, too few threads, and too little memory: what each command makes of them is its
+// result, or one line and no file. Estimates of memory are near what is needed.
 
-#include <cstdlib>
 #include <map>
 #include <utility>
 
@@ -9,8 +9,200 @@
 namespace tensorray {
 namespace {
 
-using namespace test;
+class Limits : public Program {
+ protected:
+  void SetUp() override {
+#ifdef TENSORRAY_SANITIZED
+    GTEST_SKIP() << "the address sanitizer needs terabytes of addresses";
+#endif
+    Program::SetUp();
+    write("scene.json", small_scene());
+  }
 
+  /// Without further threads: a limit that does not bind root. Another user may not see the program's folder, or this
+  /// one, but for a capability.
+  static std::string without_threads() {
+    const std::string user = geteuid() != 0 ? ""
+                                            : "setpriv --reuid=65534 --regid=65534 --clear-groups "
+                                              "--inh-caps=+dac_override --ambient-caps=+dac_override ";
+    return "exec " + user + "prlimit --nproc=1";
+  }
+
+  Outcome run_in(const std::string& shell, const std::vector<std::string>& more) const {
+    std::vector<std::string> arguments{"render", "scene.json", "-q", "-o", "a.png"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return wait_for(start_in(shell, arguments));
+  }
+};
+
+TEST_F(Limits, AreSaidInOneLine) {
+  struct Case {
+    std::string shell;
+    std::vector<std::string> more;
+    int status;
+    const char* line;
+  };
+  const std::string little = "ulimit -v 3000000; exec";
+  const std::vector<Case> cases{
+      {without_threads(), {}, 1, "Resource temporarily unavailable"},
+      {little, {"--set", "receiver.resolution=[16000,16000]"}, 2, "`/receiver/resolution` needs about"},
+      {little,
+       {"--set", "receiver.resolution=[5000,5000]", "--set", "light.wavelengths.count=64", "--set",
+        "output.spectral=a.exr"},
+       2,
+       "needs about"},
+      {little, {"--set", "integrator.type=lens", "--set", "receiver.resolution=[8000,8000]"}, 2, "ulimit -v"},
+      {little, {"--set", "integrator.type=path_tracing", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},
+      {little, {"--set", "integrator.type=scene", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},
+      {little, {"--set", "field.generate.resolution=600"}, 2, "resolution: the voxels need about"},
+      {"ulimit -v 200000; exec", {"--threads", "2"}, 1, "threads can be started"}};
+  for (const Case& each : cases) {
+    const Outcome outcome = run_in(each.shell, each.more);
+    expect_one_line(outcome, each.line, each.status);
+    EXPECT_EQ(outcome.error.rfind("tensorray: ", 0), 0u) << outcome.error;
+    EXPECT_FALSE(std::filesystem::exists(in_folder("a.png")));
+  }
+}
+
+TEST_F(Limits, OfProcessorsAreThoseOfTheRun) {
+  for (const auto& [shell, more, threads] :
+       {std::tuple{"exec taskset 1", std::vector<std::string>{"--threads", "4"}, 1},
+        std::tuple{"exec", std::vector<std::string>{"--threads", "1"}, 1}}) {
+    std::vector<std::string> arguments = more;
+    arguments.insert(arguments.end(), {"--stats", "stats.json"});
+    const Outcome outcome = run_in(shell, arguments);
+    ASSERT_EQ(outcome.status, 0) << outcome.error;
+    EXPECT_EQ(read_json("stats.json")["threads"], threads) << shell;
+  }
+}
+
+/// "needs about 1.5 GiB", in bytes.
+double needed_bytes(const std::string& error) {
+  const std::string words = "needs about ";
+  const std::size_t at = error.find(words);
+  if (at == std::string::npos) return NAN;
+  std::istringstream text(error.substr(at + words.size()));
+  double number = 0;
+  std::string unit;
+  text >> number >> unit;
+  return number * (unit.rfind("GiB", 0) == 0 ? std::exp2(30) : unit.rfind("MiB", 0) == 0 ? std::exp2(20) : NAN);
+}
+
+/// What a larger picture needs more than a smaller one: as it is estimated, and as it is measured.
+TEST_F(Limits, EstimatesOfMemoryAreNearWhatIsMeasured) {
+  struct Case {
+    std::vector<std::string> more;
+    const char* key;
+    int small, large;
+  };
+  const std::vector<std::string> paths{"--set", "integrator.type=path_tracing", "--set", "integrator.max_samples=1",
+                                       "--set", "integrator.min_samples=1",     "--set", "integrator.seeds.count=10"},
+      histogram{"--set", R"(integrator.density={"kind":"histogram"})"};
+  for (const Case& each :
+       {Case{histogram, "receiver.resolution", 1500, 3000}, Case{paths, "camera.resolution", 300, 1000}}) {
+    double estimate[2], measured[2];
+    for (const int i : {0, 1}) {
+      const int size = i == 0 ? each.small : each.large;
+      std::vector<std::string> arguments = each.more;
+      arguments.insert(arguments.end(), {"--set", std::string(each.key) + "=[" + std::to_string(size) + "," +
+                                                      std::to_string(size) + "]"});
+      estimate[i] = needed_bytes(run_in("ulimit -d 120000; exec", arguments).error);
+      arguments.insert(arguments.end(), {"--stats", "stats.json"});
+      const Outcome outcome = run_in("exec", arguments);
+      ASSERT_EQ(outcome.status, 0) << outcome.error;
+      measured[i] = read_json("stats.json")["peak_memory_bytes"];
+    }
+    EXPECT_NEAR((estimate[1] - estimate[0]) / (measured[1] - measured[0]), 1, 1.0 / 3) << each.more[1];
+  }
+}
+
+// `tensorray render --memory`: fields in files that the process maps.
+
+class Memory : public Program {
+ protected:
+  static std::string scene(const std::string& field) {
+    return R"({"field": )" + field + R"(, "light": {"photons": 20000, "wavelengths": {"count": 3}},
+               "receiver": {"resolution": [128, 128]},
+               "integrator": {"type": "photon_distribution", "density": {"kind": "gaussian"}}})";
+  }
+};
+
+TEST_F(Memory, AFieldInAFileGivesTheSamePictures) {
+  run_well({"make", "point_load", "-o", "load.vdb", "--resolution", "40"});
+  for (const char* field :
+       {R"({"generate": {"kind": "vortex", "resolution": 40}})", R"({"file": "load.vdb", "smooth": 1})",
+        R"({"file": "load.vdb", "name": "point_load_row0", "derive": "gradient", "eigenvalues": "raw"})"}) {
+    write("scene.json", scene(field));
+    run_well({"render", "scene.json", "-q", "-o", "all.exr"});
+    run_well({"render", "scene.json", "-q", "-o", "part.exr", "--memory", "1M"});
+    EXPECT_TRUE(read_file(in_folder("all.exr")) == read_file(in_folder("part.exr"))) << field;
+  }
+  EXPECT_EQ(files(), (std::vector<std::string>{"all.exr", "load.vdb", "part.exr", "scene.json"}));
+}
+
+#ifndef TENSORRAY_SANITIZED  // A sanitizer has memory of its own.
+/// The limit is of the memory that is not a file's.
+TEST_F(Memory, AFieldMayBeLargerThanTheMemory) {
+  if (std::filesystem::space(in_folder("")).available < (std::uintmax_t{2} << 30))
+    GTEST_SKIP() << "the test needs 2 GB on the disk of " << in_folder("");
+  write("scene.json", scene(R"({"generate": {"kind": "point_load", "resolution": 200}, "eigenvalues": "raw"})"));
+  const std::string limit = "ulimit -d 300000; exec";
+  const std::vector<std::string> render = {"render", "scene.json", "-q", "--threads", "2", "-o"};
+  const auto status_with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), render.begin(), render.end());
+    return wait_for(start_in(limit, more)).status;
+  };
+  EXPECT_EQ(status_with({"a.exr"}), 2);
+  EXPECT_EQ(status_with({"a.exr", "--memory", "64M"}), 0);
+}
+#endif
+
+/// Of tensors of any kind, with each interpolant.
+class CommonField : public Memory, public testing::WithParamInterface<const char*> {};
+
+/// The first process is stopped in the midst of a long render, and killed, while others use its field.
+TEST_P(CommonField, OfAllProcessesOfAMachineIsOne) {
+  const std::string note = "another process";
+  write("scene.json", scene(GetParam()));
+  const std::vector<std::string> render = {"render", "scene.json", "--memory", "1G", "-o"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), render.begin(), render.end());
+    return more;
+  };
+  std::filesystem::create_directory(in_folder("tmp"));
+  const std::string shell = "export TMPDIR=\"$PWD/tmp\"; ";
+  const auto notes_of = [&](const std::string& name) {
+    const Outcome outcome = wait_for(start_in(shell + "exec", with({name})));
+    EXPECT_EQ(outcome.status, 0) << outcome.error;
+    return outcome.error;
+  };
+  EXPECT_EQ(notes_of("alone.exr").find(note), std::string::npos);
+
+  const pid_t first =
+      start_in(shell + "exec 2>first.log; exec", with({"first.exr", "--set", "light.photons=4000000000"}));
+  while (read_file(in_folder("first.log")).find("voxels") == std::string::npos) {
+    ASSERT_EQ(waitpid(first, nullptr, WNOHANG), 0) << read_file(in_folder("first.log"));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  kill(first, SIGSTOP);
+  EXPECT_NE(notes_of("shared.exr").find(note), std::string::npos);
+  kill(first, SIGKILL);
+  wait_for(first);
+  EXPECT_EQ(notes_of("again.exr").find(note), std::string::npos);
+
+  for (const char* name : {"shared.exr", "again.exr"})
+    EXPECT_TRUE(read_file(in_folder("alone.exr")) == read_file(in_folder(name))) << name;
+  EXPECT_TRUE(std::filesystem::is_empty(in_folder("tmp")));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, CommonField,
+    testing::Values(
+        R"({"generate": {"kind": "vortex", "resolution": 40}, "scale": 1})",
+        R"({"generate": {"kind": "vortex", "resolution": 40}, "scale": 1, "border": "extend"})",
+        R"({"generate": {"kind": "point_load", "resolution": 40}, "scale": 1, "interpolation": "linear"})"));
+
+// Places where a program can be put, and what each command makes of them: its result, or one line and no file.
 /// How a command ends: with status 0 and its result, or else with a line that has this text, and without a file.
 struct End {
   int status = 0;

@@ -1,36 +1,24 @@
 #include "renderer/camera/path_tracer.h"
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <cstring>
 #include <numeric>
-#include <set>
-#include <stdexcept>
-#include <string>
 #include <thread>
 #include <utility>
 
 #include <Eigen/LU>
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include "base/constants.h"
 #include "base/process/job.h"
 #include "renderer/meshes/mesh.h"
 #include "renderer/sampling/random.h"
-#include "tests/base/rank_support.h"
 #include "tests/renderer/shapes.h"
 #include "tests/renderer/statistics.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
-
-using Eigen::Vector2d;
-using Eigen::Vector3d;
-using Eigen::Vector3f;
 
 /// Three bands whose colours are red, green and blue.
 std::vector<Band> rgb_bands() {
@@ -81,8 +69,6 @@ Mean seen(const World& world, const ShadingSettings& settings, const Vector3d& f
   }
   return mean;
 }
-
-// --- Light ----------------------------------------------------------------------------------------------------------
 
 /// Deep enough for all light; without noise from Russian roulette at the first bounces.
 ShadingSettings deep() {
@@ -197,8 +183,6 @@ TEST(ShadingNormalTest, SmoothSpheresHaveNoFringesAndDoNotLeak) {
   }
 }
 
-// --- Previews -------------------------------------------------------------------------------------------------------
-
 TEST(AmbientOcclusionTest, HasItsClosedForms) {
   ShadingSettings settings;
   settings.shading = Shading::ambient_occlusion;
@@ -221,8 +205,6 @@ TEST(HeadlightTest, IsTheCosineToTheViewer) {
   EXPECT_NEAR(seen(plane, settings, {0, -3, 4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
   EXPECT_NEAR(seen(plane, settings, {0, -3, -4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
 }
-
-// --- Pictures -------------------------------------------------------------------------------------------------------
 
 /// A sphere with data on a floor, lit by a lamp and a dim sky.
 World still_life() {
@@ -250,28 +232,6 @@ std::vector<int> samples_of(const SurfacePicture& picture) {
   return samples;
 }
 
-/// Bit for bit.
-void expect_same(const SurfacePicture& a, const SurfacePicture& b) {
-  EXPECT_EQ(a.radiance.values, b.radiance.values);
-  ASSERT_EQ(a.pixels.size(), b.pixels.size());
-  EXPECT_EQ(std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(PixelState)), 0);
-}
-
-TEST(PictureTest, DoesNotDependOnTheNumberOfThreads) {
-  const World world = still_life();
-  PathTracerSettings settings;
-  settings.min_samples = 4;
-  settings.pass_samples = 4;
-  settings.max_samples = 16;
-  settings.noise_threshold = 0.1;
-  std::vector<SurfacePicture> pictures;
-  for (const std::size_t threads : {1, 2, 8}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    pictures.push_back(render_surfaces(world.scene, camera(48), settings));
-  }
-  for (const SurfacePicture& picture : pictures) expect_same(picture, pictures[0]);
-}
-
 /// Without time, each pixel gets its first samples, whoever renders its tile; with more time than it takes, it gets
 /// all.
 TEST(PictureTest, TimeLimitsTheSamples) {
@@ -297,44 +257,6 @@ TEST(PictureTest, TimeLimitsTheSamples) {
   const std::vector<int> samples = samples_of(part);
   EXPECT_EQ(*std::max_element(samples.begin(), samples.end()), 2);
   EXPECT_EQ(samples_of(render_surfaces(world.scene, camera(20), settings)), std::vector<int>(20 * 20, 2));
-}
-
-/// Work that is divided among shards and ranks, stopped after each pass of a tile, and continued, gives the picture of
-/// one render.
-TEST(PictureTest, PartsThatStopAndContinueGiveTheSamePicture) {
-  const World world = still_life();
-  PathTracerSettings settings;
-  settings.min_samples = settings.pass_samples = 4;
-  settings.max_samples = 16;
-  settings.noise_threshold = 0.1;
-  const SurfacePicture whole = render_surfaces(world.scene, camera(40), settings);
-  Results all;
-  const auto make_part = [&](std::size_t part, Ranks* ranks) {
-    Results results;
-    for (bool is_done = false; !is_done;) {
-      Job job({part, 2}, results);
-      job.is_shard = true;
-      job.ranks = ranks;
-      RenderCallbacks callbacks;
-      callbacks.job = &job;
-      if (!ranks) callbacks.progress = [&](std::uint64_t, std::uint64_t) { job.stopping = true; };
-      render_surfaces(world.scene, camera(40), settings, callbacks);
-      results = job.results();
-      is_done = !job.stopping;
-    }
-    if (is_root(ranks)) all.insert(results.begin(), results.end());
-  };
-  make_part(0, nullptr);
-  EXPECT_EQ(all.size(), 5u);
-  test::run_ranks(3, [&](Ranks& ranks) { make_part(1, &ranks); });
-  EXPECT_EQ(all.size(), 9u);
-  Job united({0, 2}, all);
-  RenderCallbacks callbacks;
-  callbacks.job = &united;
-  expect_same(render_surfaces(world.scene, camera(40), settings, callbacks), whole);
-  Job damaged({}, {{"tile 3", std::make_shared<const std::string>("short")}});
-  callbacks.job = &damaged;
-  EXPECT_THROW(render_surfaces(world.scene, camera(40), settings, callbacks), DamagedArchive);
 }
 
 /// Within a tile: it stays as it was.

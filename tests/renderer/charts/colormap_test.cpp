@@ -1,12 +1,8 @@
 #include "renderer/charts/colormap.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <string>
-#include <vector>
 
-#include <gtest/gtest.h>
+#include "tests/names.h"
 
 namespace tensorray {
 namespace {

@@ -1,20 +1,13 @@
 #include "renderer/color/color.h"
 
-#include <cmath>
 #include <cstdlib>
 #include <stdexcept>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "renderer/spectra/spectrum.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 /// $OCIO is unset at the beginning of each test; a test may set it.
 class ColorTest : public ::testing::Test {

@@ -1,16 +1,18 @@
 #include "renderer/coverage/area_deposit.h"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
+#include <functional>
+#include <limits>
 #include <random>
 
-#include <gtest/gtest.h>
+#include <tbb/parallel_for.h>
+
+#include "renderer/coverage/planar_mesh.h"
+#include "tests/names.h"
 
 namespace tensorray {
 namespace {
 
-using Eigen::Vector2d;
 using Corners = std::array<Vector2d, 3>;
 
 constexpr int width = 13, height = 9;
@@ -157,6 +159,218 @@ TEST(AreaDeposit, LinesAreWhatThinTrianglesTendTo) {
   add_triangle(thin, a, b, c + Vector2d(0, 1e-3), 1e-3);
   const std::vector<double> expected = pixels_of(thin), pixels = pixels_of(line);
   for (std::size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(pixels[i], expected[i], 0.02e-3);
+}
+
+double uniform(std::mt19937& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
+/// A grid of cells x cells squares over [0, 1]², two triangles each. `map` moves the vertices.
+PlanarMesh grid(std::uint32_t cells, const std::function<Vector2d(const Vector2d&)>& map) {
+  PlanarMesh mesh;
+  for (std::uint32_t y = 0; y <= cells; ++y)
+    for (std::uint32_t x = 0; x <= cells; ++x) mesh.vertices.push_back(map(Vector2d(x, y) / cells));
+  for (std::uint32_t y = 0; y < cells; ++y)
+    for (std::uint32_t x = 0; x < cells; ++x) {
+      const std::uint32_t corner = y * (cells + 1) + x, above = corner + cells + 1;
+      mesh.triangles.push_back({corner, corner + 1, above});
+      mesh.triangles.push_back({corner + 1, above + 1, above});
+    }
+  return mesh;
+}
+
+/// A mesh of the unit square, moved and scaled. Inner vertices are jittered, so that all triangles are different.
+PlanarMesh jittered(std::uint32_t cells, std::mt19937& random, const Vector2d& offset = Vector2d::Zero(),
+                    double scale = 1) {
+  return grid(cells, [&](Vector2d p) {
+    for (double& coordinate : p)
+      if (coordinate > 0 && coordinate < 1) coordinate += uniform(random, -0.2, 0.2) / cells;
+    return Vector2d(offset + scale * p);
+  });
+}
+
+Vector2d at(const PlanarMesh& mesh, const PlanarHit& hit) {
+  Vector2d point = Vector2d::Zero();
+  for (int i = 0; i < 3; ++i) point += hit.weights[i] * mesh.vertices[mesh.triangles[hit.triangle][i]];
+  return point;
+}
+
+std::vector<std::uint32_t> triangles(const std::vector<PlanarHit>& hits) {
+  std::vector<std::uint32_t> result;
+  for (const PlanarHit& hit : hits) result.push_back(hit.triangle);
+  return result;
+}
+
+std::vector<std::uint32_t> found(const PlanarMeshSearch& search, const Vector2d& point) {
+  std::vector<PlanarHit> hits;
+  search.find(point, hits);
+  return triangles(hits);
+}
+
+std::vector<std::uint32_t> brute_force(const PlanarMesh& mesh, const Vector2d& point) {
+  using Precise = Eigen::Matrix<long double, 2, 1>;
+  std::vector<std::uint32_t> result;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    int left = 0, right = 0;
+    for (int i = 0; i < 3; ++i) {
+      const Precise start = mesh.vertices[mesh.triangles[t][i]].cast<long double>();
+      const Precise edge = mesh.vertices[mesh.triangles[t][(i + 1) % 3]].cast<long double>() - start;
+      const Precise to_point = point.cast<long double>() - start;
+      const long double side = edge.x() * to_point.y() - edge.y() * to_point.x();
+      left += side > 0;
+      right += side < 0;
+    }
+    if (left == 3 || right == 3) result.push_back(t);
+  }
+  return result;
+}
+
+/// The triangles that contain all of these vertices.
+std::vector<std::uint32_t> sharing(const PlanarMesh& mesh, const std::vector<std::uint32_t>& vertices) {
+  std::vector<std::uint32_t> result;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    if (std::all_of(vertices.begin(), vertices.end(), [&](std::uint32_t vertex) {
+          return std::count(mesh.triangles[t].begin(), mesh.triangles[t].end(), vertex) > 0;
+        }))
+      result.push_back(t);
+  return result;
+}
+
+TEST(PlanarMesh, AgreesWithBruteForceWhereTrianglesOverlap) {
+  std::mt19937 random(1);
+  PlanarMesh mesh;  // Unconnected triangles of all sizes and both orientations.
+  for (std::uint32_t i = 0; i < 600; ++i) {
+    const double size = std::pow(10, uniform(random, -3, -0.5));
+    const Vector2d center(uniform(random, 0, 1), uniform(random, 0, 1));
+    for (int corner = 0; corner < 3; ++corner)
+      mesh.vertices.push_back(center + size * Vector2d(uniform(random, -1, 1), uniform(random, -1, 1)));
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  const PlanarMeshSearch search(mesh);
+  std::size_t total = 0;
+  std::vector<PlanarHit> hits;
+  for (int i = 0; i < 5000; ++i) {
+    const Vector2d point(uniform(random, -0.2, 1.2), uniform(random, -0.2, 1.2));
+    search.find(point, hits);
+    ASSERT_EQ(triangles(hits), brute_force(mesh, point));
+    for (const PlanarHit& hit : hits) {
+      EXPECT_GE(hit.weights.minCoeff(), 0);
+      EXPECT_NEAR(hit.weights.sum(), 1, 1e-15);
+      EXPECT_LT((at(mesh, hit) - point).norm(), 1e-14);
+    }
+    total += hits.size();
+  }
+  EXPECT_GT(total, 2000u);
+}
+
+struct Place {
+  Vector2d offset;
+  double scale;
+};
+
+class PlanarMeshPlaces : public ::testing::TestWithParam<Place> {};
+
+INSTANTIATE_TEST_SUITE_P(Places, PlanarMeshPlaces,
+                         ::testing::Values(Place{{0, 0}, 1}, Place{{1000, -1000}, 1}, Place{{3e-20, 0}, 1e-20},
+                                           Place{{0, 1e20}, 1e20}));
+
+TEST_P(PlanarMeshPlaces, PointsOnEdgesAndVerticesAreFoundInAllTrianglesThatShareThem) {
+  std::mt19937 random(3);
+  const PlanarMesh mesh = jittered(40, random, GetParam().offset, GetParam().scale);
+  const PlanarMeshSearch search(mesh);
+  for (std::uint32_t vertex = 0; vertex < mesh.vertices.size(); ++vertex)
+    ASSERT_EQ(found(search, mesh.vertices[vertex]), sharing(mesh, {vertex}));
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t from = mesh.triangles[t][i], to = mesh.triangles[t][(i + 1) % 3];
+      const Vector2d point =
+          mesh.vertices[from] + uniform(random, 0.01, 0.99) * (mesh.vertices[to] - mesh.vertices[from]);
+      ASSERT_EQ(found(search, point), sharing(mesh, {from, to}));
+    }
+}
+
+TEST_P(PlanarMeshPlaces, NoPointFallsBetweenTriangles) {
+  std::mt19937 random(4);
+  const auto& [offset, scale] = GetParam();
+  const PlanarMesh mesh = jittered(300, random, offset, scale);
+  const PlanarMeshSearch search(mesh);
+  const Vector2d center = offset + Vector2d::Constant(scale / 2);
+  std::vector<PlanarHit> hits;
+  for (int i = 0; i < 50000; ++i) {
+    const auto& triangle = mesh.triangles[random() % mesh.triangles.size()];
+    const Vector2d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]];
+    // Distance from an edge or a vertex, from below double precision to above single precision.
+    const double away = scale * std::pow(10, uniform(random, -18, -5)), along = i % 3 ? uniform(random, 0, 1) : 0;
+    Vector2d point = a + along * (b - a) + away * Vector2d(uniform(random, -1, 1), uniform(random, -1, 1));
+    point = point.cwiseMax(mesh.vertices.front()).cwiseMin(mesh.vertices.back());
+    search.find(point, hits);
+    ASSERT_GE(hits.size(), 1u) << (point - center).transpose();
+    for (const PlanarHit& hit : hits) {
+      EXPECT_GE(hit.weights.minCoeff(), 0);
+      EXPECT_NEAR(hit.weights.sum(), 1, 1e-15);
+      EXPECT_LT((at(mesh, hit) - point).norm(), 1e-14 * (center.norm() + scale));
+    }
+  }
+}
+
+TEST(PlanarMesh, TrianglesThinnerThanSinglePrecisionAreTold) {
+  // Cells about 1e-10 wide, around x = 1/3.
+  const std::uint32_t cells = 20;
+  const PlanarMesh mesh = grid(cells, [](const Vector2d& p) {
+    const double x = p.x() == 0 ? 0 : p.x() == 1 ? 1 : 1.0 / 3 + 2e-9 * (p.x() - 0.5);
+    return Vector2d(x, p.y());
+  });
+  const PlanarMeshSearch search(mesh);
+  std::mt19937 random(6);
+  int on_edges = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Vector2d point(1.0 / 3 + uniform(random, -1e-9, 1e-9), uniform(random, 0, 1));
+    const auto hits = found(search, point), expected = brute_force(mesh, point);
+    ASSERT_TRUE(std::includes(hits.begin(), hits.end(), expected.begin(), expected.end()));
+    on_edges += hits != expected;
+  }
+  // The rounding error is 1e-5 of a cell's width: about one in a thousand points is on an edge.
+  EXPECT_LT(on_edges, 25);
+}
+
+TEST(PlanarMesh, ANeedleDoesNotReachBeyondItsTip) {
+  for (const Vector2d& axis : {Vector2d(1, 0), Vector2d(0, 1), Vector2d(0.6, 0.8)}) {
+    PlanarMesh mesh;
+    const Vector2d across(-axis.y(), axis.x());
+    mesh.vertices = {Vector2d::Zero(), axis, 0.5 * axis + 1e-14 * across, 2 * axis, across};
+    mesh.triangles = {{0, 1, 2}, {1, 3, 4}};
+    const PlanarMeshSearch search(mesh);
+    EXPECT_EQ(found(search, 0.5 * axis), std::vector<std::uint32_t>{0});
+    EXPECT_TRUE(found(search, -1e-6 * axis).empty());
+    EXPECT_EQ(found(search, 1.1 * axis), std::vector<std::uint32_t>{1});
+  }
+}
+
+TEST(PlanarMesh, DegenerateTrianglesAreNeverFound) {
+  // Two triangles with one of zero area between them, one that is a point, and one with a repeated vertex.
+  PlanarMesh mesh;
+  mesh.vertices = {{0, 0}, {1, 1}, {0.25, 0.25}, {1, 0}, {0, 1}};
+  mesh.triangles = {{0, 1, 2}, {2, 2, 2}, {0, 3, 1}, {0, 0, 1}, {0, 2, 4}, {2, 1, 4}};
+  const PlanarMeshSearch search(mesh);
+  EXPECT_EQ(found(search, {0.125, 0.125}), (std::vector<std::uint32_t>{2, 4}));
+  EXPECT_EQ(found(search, {0.25, 0.25}), (std::vector<std::uint32_t>{2, 4, 5}));
+  EXPECT_EQ(found(search, {0.5, 0.5}), (std::vector<std::uint32_t>{2, 5}));
+}
+
+TEST(PlanarMesh, NothingIsFoundOutsideOrInAnEmptyMesh) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
+  PlanarMesh empty, point, square = grid(1, [](const Vector2d&p) { return p; });
+  point.vertices = {{2, 3}};
+  point.triangles = {{0, 0, 0}};
+  square.vertices.emplace_back(nan, infinite);  // Vertices that no triangle uses.
+  for (const PlanarMesh* mesh : {&empty, &point, &square}) {
+    const PlanarMeshSearch search(*mesh);
+    for (const Vector2d& place : {Vector2d(2, 3), Vector2d(-1e-9, 0.5), Vector2d(0.5, 1 + 1e-9), Vector2d(1e300, 0),
+                                  Vector2d(nan, 0.5), Vector2d(infinite, 0)})
+      EXPECT_TRUE(found(search, place).empty()) << place.transpose();
+  }
+  EXPECT_TRUE(found(PlanarMeshSearch(empty), Vector2d::Zero()).empty());
+  EXPECT_EQ(found(PlanarMeshSearch(square), {0.9, 0.8}), std::vector<std::uint32_t>{1});
 }
 
 }  // namespace

@@ -1,24 +1,17 @@
 #include "renderer/density/density.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <random>
 #include <stdexcept>
-#include <string>
 
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
+#include "tests/names.h"
 
 namespace tensorray {
 namespace {
 
-using Eigen::Matrix2d;
-using Eigen::Vector2d;
 using Points = std::vector<Vector2d>;
 
 const DensitySettings footprints{DensityKind::photon_differential};
@@ -145,9 +138,6 @@ TEST(Density, MomentsOfFootprintsAreThoseOfTheEllipse) {
 /// Each kind of kernel.
 const std::vector<DensitySettings> all_kinds{
     {DensityKind::histogram}, {DensityKind::gaussian, 0.8}, {DensityKind::gaussian, 3}, footprints};
-const std::vector<Eigen::Vector3d> rgb{{1, 0.2, 0}, {-0.1, 0.9, 0.3}, {0, 0, 2}};
-constexpr int width = 150, height = 101;
-
 std::string sums_of(DensityEstimator& estimator) {
   Archive archive;
   estimator.copy_sums(archive);

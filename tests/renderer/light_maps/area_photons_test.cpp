@@ -1,10 +1,5 @@
 // Photons of area lights, and their weights beside the other techniques that find this light.
 
-#include <algorithm>
-#include <cmath>
-
-#include <gtest/gtest.h>
-
 #include "base/constants.h"
 #include "base/geometry/box.h"
 #include "renderer/light_maps/photon_tracer.h"
@@ -14,8 +9,6 @@
 
 namespace tensorray {
 namespace {
-
-using Eigen::Vector3d;
 
 constexpr int bands = 2;
 constexpr double half_size = 1, half_height = 0.3;

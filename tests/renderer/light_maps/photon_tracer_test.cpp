@@ -1,27 +1,21 @@
 #include "renderer/light_maps/photon_tracer.h"
 
 #include <atomic>
-#include <cmath>
-#include <cstring>
 #include <numeric>
 
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include "base/constants.h"
 #include "base/geometry/box.h"
 #include "base/process/job.h"
+#include "renderer/light_maps/photon_map.h"
 #include "renderer/sampling/random.h"
 #include "renderer/shading/shading.h"
-#include "tests/base/rank_support.h"
 #include "tests/renderer/shapes.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Vector3d;
 
 constexpr int traced_bands = 2;
 
@@ -107,30 +101,6 @@ TEST(PhotonTracerTest, TheSunsPowerIsThatOfTheSilhouette) {
   EXPECT_EQ(photons.counts, std::vector<PhotonCounts>(2, {1000 * traced_bands, {0, 1000 * traced_bands, 0, 0}}));
   EXPECT_NEAR(power_in(photons, 0), 0.5 * 2 * silhouette, 1e-6);
   EXPECT_NEAR(power_in(photons, 1), 0.5 * 3 * silhouette, 1e-6);
-}
-
-TEST(PhotonTracerTest, OfRanksAreThoseOfOneProcess) {
-  const SurfaceScene floor = floor_at(-0.8, 3);
-  const std::vector<Light> lights{sun({0.4, 0.3, -1}), PointLight{{0, 0, 2}, {5, 7}}};
-  PhotonTracerSettings settings = settings_of(1000, 2);
-  const PhotonMaps alone = traced(ClearCube(0.5), floor, lights, settings);
-  std::vector<PhotonMaps> photons(3);
-  run_ranks(photons.size(), [&](Ranks& ranks) {
-    Job job;
-    job.ranks = &ranks;
-    PhotonTracerSettings mine = settings;
-    mine.job = &job;
-    photons[ranks.rank()] = traced(ClearCube(0.5), floor, lights, mine);
-  });
-  for (const PhotonMaps& each : photons) {
-    EXPECT_EQ(each.counts, alone.counts);
-    ASSERT_EQ(each.passes.size(), alone.passes.size());
-    for (std::size_t pass = 0; pass < each.passes.size(); ++pass) {
-      const std::vector<Photon>&a = each.passes[pass].photons(), &b = alone.passes[pass].photons();
-      ASSERT_EQ(a.size(), b.size());
-      EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(Photon)), 0);
-    }
-  }
 }
 
 /// A band, a surface or a light that is not there would be an index beyond all memory.
@@ -273,23 +243,6 @@ TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
   EXPECT_NEAR(beside.mean(), mean_of(straight, 2).mean(), 5 * beside.error() + 1e-9);
 }
 
-TEST(PhotonTracerTest, TheSameBytesOnAnyNumberOfThreads) {
-  const SurfaceScene floor = floor_at(-0.8, 40);
-  const std::vector<Light> lights{sun({0.1, 0, -1}, 0.05), PointLight{{0, 0, 2}, {5, 7}},
-                                  AreaLight{rectangle_mesh({1, 0, 3}, {1, 0, 0}, {0, -1, 0}, {1, 1}), {5, 7}}};
-  std::vector<PhotonMaps> results;
-  for (const std::size_t threads : {1, 2, 7}) {
-    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    results.push_back(traced(ClearCube(), floor, lights, settings_of(5000, 2)));
-  }
-  for (const PhotonMaps& result : results)
-    for (std::size_t pass = 0; pass < 2; ++pass) {
-      const auto &photons = result.passes[pass].photons(), &first = results[0].passes[pass].photons();
-      ASSERT_EQ(photons.size(), first.size());
-      EXPECT_EQ(std::memcmp(photons.data(), first.data(), photons.size() * sizeof(Photon)), 0);
-    }
-}
-
 /// The lattice finds what a search through all photons finds.
 TEST(PhotonTracerTest, VisitsAllPhotonsInReach) {
   std::vector<Photon> photons(3000);
@@ -347,6 +300,36 @@ TEST(PhotonTracerTest, APointWithinTheRegionShinesAllAround) {
   }
   EXPECT_TRUE(
       traced(ClearCube(), floor_at(-0.8, 40), {PointLight{{0, 0, 0.2}, {5, 7}}}, settings_of(0)).passes.empty());
+}
+
+IrradianceMap map_of(const std::vector<float>& irradiance, int width, int height) {
+  IrradianceMap map;
+  map.plate.size = {2, 1};
+  map.plate.resolution = {width, height};
+  map.bands = 1;
+  map.irradiance = irradiance;
+  return map;
+}
+
+double irradiance_at(const IrradianceMap& map, double x, double y) {
+  Eigen::ArrayXd sum = Eigen::ArrayXd::Zero(1);
+  add_irradiance(map, map.plate.to_world({x, y}), sum);
+  return sum[0];
+}
+
+TEST(IrradianceMapTest, AUniformPlateIsUniformToItsEdge) {
+  for (const auto& [width, height] : {std::pair(8, 4), std::pair(1, 1), std::pair(1, 5)}) {
+    const IrradianceMap map = map_of(std::vector<float>(static_cast<std::size_t>(width * height), 3), width, height);
+    for (double x = 0; x <= width; x += 0.125)
+      for (double y = 0; y <= height; y += 0.125) EXPECT_NEAR(irradiance_at(map, x, y), 3, 1e-12) << x << " " << y;
+    EXPECT_EQ(irradiance_at(map, -0.1, height / 2.0) + irradiance_at(map, width + 0.1, height / 2.0), 0);
+  }
+}
+
+TEST(IrradianceMapTest, IsLinearBetweenPixelsAndEvenBeyondTheOutermostCentres) {
+  const IrradianceMap map = map_of({1, 2, 4}, 3, 1);
+  for (const auto& [x, value] : {std::pair(0.0, 1.0), {0.5, 1.0}, {0.75, 1.25}, {1.5, 2.0}, {2.25, 3.5}, {3.0, 4.0}})
+    EXPECT_NEAR(irradiance_at(map, x, 0.2), value, 1e-6) << x;
 }
 
 }  // namespace

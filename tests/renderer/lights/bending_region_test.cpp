@@ -1,10 +1,5 @@
 #include "renderer/lights/bending_region.h"
 
-#include <algorithm>
-#include <cmath>
-
-#include <gtest/gtest.h>
-
 #include "base/constants.h"
 #include "renderer/camera/path_tracer.h"
 #include "renderer/meshes/mesh.h"
@@ -12,8 +7,6 @@
 
 namespace tensorray {
 namespace {
-
-using Eigen::Vector3d;
 
 constexpr int bands = 4;
 

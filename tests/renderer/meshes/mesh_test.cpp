@@ -1,15 +1,9 @@
 #include "renderer/meshes/mesh.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <stdexcept>
-#include <string>
 #include <utility>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "base/constants.h"
 #include "tests/renderer/shapes.h"
@@ -17,10 +11,6 @@
 
 namespace tensorray {
 namespace {
-
-using Eigen::AlignedBox3d;
-using Eigen::Vector3d;
-using ::testing::HasSubstr;
 
 double surface_area(const TriangleMesh& mesh) {
   double sum = 0;

@@ -1,20 +1,19 @@
 #include "renderer/spectra/spectrum.h"
 
-#include <algorithm>
-#include <cmath>
+#include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <stdexcept>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include <Eigen/LU>
 
+#include "renderer/color/color.h"
+#include "renderer/spectra/reflectance.h"
 #include "tests/data_folder.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
-
-using ::testing::HasSubstr;
 
 /// The chromaticity of a light over the whole range of the observer.
 Eigen::Vector2d chromaticity(const Spectrum& light, int count = 1) {
@@ -173,6 +172,179 @@ TEST(ReadSpectrumTest, ErrorsNameFileLineAndMend) {
   EXPECT_THAT(error("-400 1\n"), HasSubstr("line 1: the wavelength must be above 0"));
   EXPECT_THAT(message([] { read_spectrum("/no/such.csv"); }), HasSubstr("/no/such.csv: no such file"));
   EXPECT_THAT(message([] { read_spectrum(::testing::TempDir()); }), HasSubstr("folder"));
+}
+
+/// A light in bands, the colours of the bands in the working space, and the model made from them.
+struct Scene {
+  std::vector<Band> bands;
+  Matrix3d xyz_to_rgb;
+  ReflectanceModel model;
+
+  /// The colour of a spectrum (any type with at()) in this light.
+  template <class Reflectance>
+  Vector3d color(const Reflectance& reflectance) const {
+    Vector3d xyz = Vector3d::Zero();
+    for (const Band& band : bands) xyz += reflectance.at(band.wavelength) * band.xyz;
+    return xyz_to_rgb * xyz;
+  }
+};
+
+/// The built-in config; its working space has the primaries of Rec.709.
+ColorManagement rec709() {
+  unsetenv("OCIO");
+  return ColorManagement({});
+}
+
+Scene make_scene(const Spectrum& light, int count, const Matrix3d& from_rec709 = Matrix3d::Identity()) {
+  const std::vector<Band> bands = make_bands(light, 380, 730, count);
+  Vector3d white = Vector3d::Zero();
+  for (const Band& band : bands) white += band.xyz;
+  const Matrix3d xyz_to_rgb = from_rec709 * rec709().xyz_to_working_adapted(white);
+  return {bands, xyz_to_rgb, ReflectanceModel(bands, xyz_to_rgb)};
+}
+
+/// The matrix from linear Rec.709 to ACEScg that maps white to white (Bradford).
+Matrix3d rec709_to_acescg() {
+  Matrix3d matrix;
+  matrix << 0.613097, 0.339523, 0.047379, 0.070194, 0.916354, 0.013452, 0.020616, 0.109570, 0.869815;
+  return matrix;
+}
+
+struct NamedLight {
+  std::string name;
+  Spectrum spectrum;
+};
+
+std::vector<NamedLight> lights() {
+  return {{"D65", illuminant("D65")}, {"A", illuminant("A")}, {"E", illuminant("E")}, {"5500 K", blackbody(5500)}};
+}
+
+/// The cube [least, most]³, corners and edges included.
+std::vector<Vector3d> cube(int steps, double least = 0, double most = 1) {
+  std::vector<Vector3d> colors;
+  for (int r = 0; r <= steps; ++r)
+    for (int g = 0; g <= steps; ++g)
+      for (int b = 0; b <= steps; ++b)
+        colors.push_back(Vector3d::Constant(least) + (most - least) / steps * Vector3d(r, g, b));
+  return colors;
+}
+
+/// CIE 1976 L*a*b* of linear Rec.709, relative to its white.
+Vector3d lab(const Matrix3d& rgb_to_xyz, const Vector3d& rgb) {
+  const Vector3d relative = (rgb_to_xyz * rgb).cwiseQuotient(rgb_to_xyz * Vector3d::Ones());
+  const Vector3d f =
+      relative.unaryExpr([](double t) { return t > 216.0 / 24389 ? std::cbrt(t) : (24389.0 / 27 * t + 16) / 116; });
+  return {116 * f.y() - 16, 500 * (f.x() - f.y()), 200 * (f.y() - f.z())};
+}
+
+/// The smallest distance to a colour that any reflectances of the bands within [0, 1], smooth or not, can reach. A
+/// convex problem, solved by optimising one band after the other.
+double min_distance(const Scene& scene, const Vector3d& rgb) {
+  std::vector<double> reflectances(scene.bands.size(), 0);
+  Vector3d residual = -rgb;
+  for (double before = std::numeric_limits<double>::max(); residual.norm() < before - 1e-7;) {
+    before = residual.norm();
+    for (int sweep = 0; sweep < 100; ++sweep)
+      for (std::size_t k = 0; k < scene.bands.size(); ++k) {
+        const Vector3d color = scene.xyz_to_rgb * scene.bands[k].xyz;
+        const double value = reflectances[k] - color.dot(residual) / color.squaredNorm();
+        const double clamped = std::clamp(value, 0.0, 1.0);
+        residual += (clamped - reflectances[k]) * color;
+        reflectances[k] = clamped;
+      }
+  }
+  return residual.norm();
+}
+
+TEST(ReflectanceTest, ColorsComeBack) {
+  const Matrix3d rgb_to_xyz = rec709().xyz_to_working().inverse();
+  for (const NamedLight& light : lights())
+    for (const int count : {10, 16, 32, 70}) {
+      const Scene scene = make_scene(light.spectrum, count);
+      for (const Vector3d& rgb : cube(14)) {
+        const Vector3d result = scene.color(scene.model.spectrum(rgb));
+        // OpenColorIO's matrices, and therefore the white, are in single precision.
+        ASSERT_LT((result - rgb).norm(), 3e-7) << light.name << ", " << count << " bands: " << rgb.transpose();
+        ASSERT_LT((lab(rgb_to_xyz, result) - lab(rgb_to_xyz, rgb)).norm(), 0.1) << rgb.transpose();
+      }
+    }
+}
+
+TEST(ReflectanceTest, WideGamutComesAsNearAsAnyReflectance) {
+  int out_of_reach = 0;
+  const Scene scene = make_scene(illuminant("D65"), 16, rec709_to_acescg());
+  for (const Vector3d& rgb : cube(6)) {
+    const double least = min_distance(scene, rgb);
+    out_of_reach += least > 1e-3;
+    EXPECT_LT((scene.color(scene.model.spectrum(rgb)) - rgb).norm(), least + 0.01) << rgb.transpose();
+  }
+  EXPECT_GT(out_of_reach, 10);
+}
+
+TEST(ReflectanceTest, SpectraOfTheModelAreFoundAgain) {
+  const Scene scene = make_scene(illuminant("D65"), 32);
+  for (const Vector3d& c : cube(6, -3, 3)) {
+    const ReflectanceSpectrum wanted{{c[0], c[1], c[2]}, 1};
+    const Vector3d rgb = scene.color(wanted);
+    if (rgb.minCoeff() < 0 || rgb.maxCoeff() > 1 || rgb.maxCoeff() < 0.05) continue;
+    const ReflectanceSpectrum found = scene.model.spectrum(rgb);
+    for (double wavelength = 380; wavelength <= 730; wavelength += 10)
+      ASSERT_NEAR(found.at(wavelength), wanted.at(wavelength), 1e-5) << c.transpose() << " at " << wavelength;
+  }
+}
+
+TEST(ReflectanceTest, IsWithinZeroAndOneAndDeterministic) {
+  for (const Matrix3d& space : {Matrix3d(Matrix3d::Identity()), rec709_to_acescg()})
+    for (const int count : {1, 2, 3, 4, 5, 16}) {
+      const Scene scene = make_scene(illuminant("D65"), count, space),
+                  other = make_scene(illuminant("D65"), count, space);
+      for (const Vector3d& rgb : cube(5)) {
+        const ReflectanceSpectrum spectrum = scene.model.spectrum(rgb);
+        EXPECT_EQ(spectrum.coefficients, other.model.spectrum(rgb).coefficients);
+        for (double wavelength = 360; wavelength <= 830; wavelength += 5)
+          ASSERT_TRUE(spectrum.at(wavelength) >= 0 && spectrum.at(wavelength) <= 1)
+              << count << ": " << rgb.transpose() << " at " << wavelength;
+      }
+    }
+}
+
+TEST(ReflectanceTest, GreyIsConstant) {
+  for (const int count : {1, 2, 16}) {
+    const Scene scene = make_scene(illuminant("A"), count);
+    for (const double grey : {0.0, 1e-30, 0.01, 0.18, 0.5, 1.0, 7.3})
+      for (const double wavelength : {380.0, 555.0, 730.0})
+        EXPECT_DOUBLE_EQ(scene.model.spectrum(Vector3d::Constant(grey)).at(wavelength), grey);
+  }
+}
+
+TEST(ReflectanceTest, NegativeIsZeroAndWhatIsNotFiniteIsBlack) {
+  const Scene scene = make_scene(illuminant("D65"), 16);
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(scene.model.spectrum({-1, 0.5, 0.2}).coefficients, scene.model.spectrum({0, 0.5, 0.2}).coefficients);
+  for (const Vector3d& black : {Vector3d(0, -1, -2), Vector3d(std::nan(""), 1, 1), Vector3d(0.2, infinity, 0),
+                                Vector3d(0.2, 0.1, std::nan("")), Vector3d(-infinity, 1, 1)})
+    EXPECT_EQ(scene.model.spectrum(black).at(555), 0) << black.transpose();
+}
+
+TEST(ReflectanceTest, ScalesAboveOneAndNearBlack) {
+  const Scene scene = make_scene(illuminant("D65"), 16);
+  for (const Vector3d& rgb : {Vector3d(1, 0.2, 0.1), Vector3d(0.3, 1, 0.9), Vector3d(0, 0, 1)})
+    for (const double factor : {1e-300, 1e-9, 0.01, 2.5, 1e9}) {
+      const Vector3d wanted = factor * rgb;
+      const ReflectanceSpectrum spectrum = scene.model.spectrum(wanted);
+      EXPECT_LT((scene.color(spectrum) - wanted).norm(), 1e-7 * factor) << wanted.transpose();
+      if (factor < 1) continue;
+      for (const double wavelength : {400.0, 500.0, 600.0, 700.0})
+        EXPECT_NEAR(spectrum.at(wavelength) / factor, scene.model.spectrum(rgb).at(wavelength), 1e-5);
+    }
+}
+
+TEST(ReflectanceTest, LightOfOneWavelength) {
+  const std::vector<Band> bands = make_bands(illuminant("D65"), 550, 550, 1);
+  const ReflectanceModel model(bands, rec709().xyz_to_working_adapted(bands.front().xyz));
+  // All colours of this model are neutral: the nearest one to a colour is the mean of its components.
+  EXPECT_NEAR(model.spectrum({0.9, 0.3, 0.6}).at(550), 0.6, 1e-5);
+  EXPECT_NEAR(model.spectrum({0, 0, 0.3}).at(550), 0.1, 1e-5);
 }
 
 }  // namespace

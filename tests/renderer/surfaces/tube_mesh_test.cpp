@@ -1,20 +1,14 @@
 #include "renderer/surfaces/tube_mesh.h"
 
 #include <array>
-#include <cmath>
 #include <map>
 #include <tuple>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
 
 #include "base/constants.h"
 #include "tests/renderer/shapes.h"
 
 namespace tensorray {
 namespace {
-
-using Eigen::Vector3d;
 
 /// A tube along z from 0 to `length`, with semi-axes a along x and b along y.
 Tube straight_tube(double a, double b, double length, int points) {

@@ -3,11 +3,9 @@
 #include "scenes/jobs/work_file.h"
 
 #include <fstream>
-#include <iterator>
-
-#include <gtest/gtest.h>
 
 #include "base/files/temporary_folder.h"
+#include "tests/files.h"
 
 namespace tensorray {
 namespace {
@@ -51,12 +49,7 @@ TEST(WorkFileTest, WhatBelongsToNoRenderIsRefused) {
   wrong.back().origin["scene"]["key"] = deep;
   for (std::size_t i = 0; i < wrong.size(); ++i) {
     write_work(file, wrong[i]);
-    try {
-      read_work(file);
-      ADD_FAILURE() << i << " is read";
-    } catch (const std::runtime_error& error) {
-      EXPECT_NE(std::string(error.what()).find("a.shard: is damaged"), std::string::npos) << i << error.what();
-    }
+    EXPECT_THAT(message([&] { read_work(file); }), ::testing::HasSubstr("a.shard: is damaged")) << i;
   }
 }
 
@@ -82,8 +75,7 @@ TEST(WorkFileTest, WhatIsDamagedIsRefused) {
   const TemporaryFolder folder;
   const std::filesystem::path file = folder / "a.shard";
   write_work(file, right_work());
-  std::ifstream stream(file, std::ios::binary);
-  const std::string right{std::istreambuf_iterator<char>(stream), {}};
+  const std::string right = bytes_of(file);
   const auto expect_refused = [&](const std::string& bytes) {
     std::ofstream(file, std::ios::binary) << bytes;
     EXPECT_THROW(read_work(file), std::runtime_error);

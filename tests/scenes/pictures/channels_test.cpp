@@ -1,5 +1,3 @@
-// The channels of pictures: docs/scenes.md lists those of each method.
-
 #include <regex>
 
 #include "integrators/methods/read_scene.h"
@@ -9,8 +7,6 @@
 
 namespace tensorray {
 namespace {
-
-using namespace test;
 
 /// The names in the tables of channels of the documents' section about a method: "| `texture.s`, `.t` | ... |".
 Settings documented_channels(const std::string& method) {

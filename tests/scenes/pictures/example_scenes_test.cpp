@@ -2,15 +2,11 @@
 
 #include <cmath>
 
-#include <Eigen/Core>
-
 #include "tests/data_folder.h"
 #include "tests/scenes/pictures/pictures.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
 
 std::vector<std::filesystem::path> scenes_in(const char* folder) {
   std::vector<std::filesystem::path> scenes;

@@ -2,14 +2,34 @@
 
 #include <set>
 
-#include <gmock/gmock.h>
-
-#include "tests/scenes/pictures/paths_support.h"
+#include "integrators/path_tracing/path_colors.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "tests/scenes/pictures/pictures.h"
 
 namespace tensorray {
 namespace {
 
-using namespace test;
+/// A scene that renders quickly. The volume reaches from -1 to 1, and from -2 to 0 along z.
+constexpr const char* small_paths =
+    R"({"field": {"generate": {"kind": "point_load", "resolution": 9}, "scale": 6},
+             "light": {"photons": 500, "wavelengths": {"count": 4}},
+             "receiver": {"resolution": [16, 16]},
+             "integrator": {"type": "path_tracing", "seeds": {"count": 16}, "max_samples": 4, "noise": 0,
+                            "filter": "box"},
+             "camera": {"resolution": [24, 16]}})";
+
+/// The covered area of the picture, in pixels.
+double covered(const Image& image) { return sum(channel(image, "A")); }
+
+constexpr const char* seen_from_the_side =
+    R"(camera={"position": [0, -6, 2], "target": [0, 0, -1], "resolution": [24, 16]})";
+constexpr const char* transparent = "integrator.background=transparent";
+constexpr const char* without_box = "integrator.context.box=false";
+
+class Paths : public Pictures {
+ protected:
+  Paths() { write("scene.json", small_paths); }
+};
 
 TEST_F(Paths, TheSameBytesOnAnyNumberOfThreads) {
   const Settings names{"out.png", "linear.exr", "out.spectral.exr", "out.vtp", "out.ply"};
@@ -112,6 +132,128 @@ TEST_F(Paths, WhatAUserCanGetWrong) {
   expect_error(2, "/integrator/material/metal.*gold.*cheese",
                {"integrator.material.kind=metal", "integrator.material.metal=cheese"});
   expect_error(2, "/output/photons.*no photons", {}, {"out.vdb"});
+}
+
+TEST_F(Paths, ContextIsShown) {
+  const Settings from_here{transparent, seen_from_the_side};
+  const auto with = [&](const std::string& setting) {
+    Settings settings = from_here;
+    settings.push_back(setting);
+    return render(settings);
+  };
+  const double plain = covered(render(from_here));
+  EXPECT_LT(covered(with(without_box)), plain - 1);
+  std::vector<Image> pictures;
+  for (const std::string& setting :
+       {std::string("integrator.context.plate=true"), std::string("integrator.context.slice={}"),
+        std::string(R"(integrator.context.isosurfaces=[{"invariant": "norm", "value": 1}])")}) {
+    pictures.push_back(with(setting));
+    const Image& image = pictures.back();
+    EXPECT_GT(covered(image), plain + 4) << setting;
+    const std::vector<float> alpha = channel(image, "A"), path = channel(image, "path"),
+                             force = channel(image, "force");
+    for (std::size_t i = 0; i < alpha.size(); ++i)
+      if (path[i] == -1) {
+        EXPECT_EQ(force[i], 0) << setting;
+      }
+  }
+  EXPECT_NE(with(R"(integrator.context.slice={"map": "magma"})").pixels, pictures[1].pixels);
+  const Image& caustic = pictures[0];
+  const std::vector<float> light = channel(caustic, "albedo.G"), alpha = channel(caustic, "A"),
+                           path = channel(caustic, "path");
+  std::set<float> shades;
+  for (std::size_t i = 0; i < light.size(); ++i)
+    if (alpha[i] == 1 && path[i] == -1) shades.insert(light[i]);
+  EXPECT_GT(shades.size(), 10u);
+}
+
+TEST_F(Paths, Backgrounds) {
+  const auto corner = [&](const std::vector<std::string>& settings) {
+    const Image image = render(settings);
+    return Eigen::Vector4f(channel(image, "R")[0], channel(image, "G")[0], channel(image, "B")[0],
+                           channel(image, "A")[0]);
+  };
+  EXPECT_LT((corner({}) - Eigen::Vector4f(1, 1, 1, 1)).norm(), 1e-4f);
+  EXPECT_LT((corner({"integrator.background_color=[0.2,0.2,0.2]"}) - Eigen::Vector4f(0.2f, 0.2f, 0.2f, 1)).norm(),
+            1e-4f);
+  EXPECT_EQ(corner({transparent}), Eigen::Vector4f(0, 0, 0, 0));
+  const Eigen::Vector4f sky =
+      corner({"integrator.background=lights", R"(lights=[{"kind": "constant", "strength": 0.3}])"});
+  EXPECT_LT((sky - Eigen::Vector4f(0.3f, 0.3f, 0.3f, 1)).norm(), 2e-3f);
+}
+
+TEST_F(Paths, MaterialsOfEveryKind) {
+  std::set<std::vector<float>> pictures;
+  for (const std::string material :
+       {R"("kind": "diffuse")", R"("kind": "principled")", R"("kind": "principled", "clearcoat": 1)",
+        R"("kind": "metal", "metal": "copper")", R"("kind": "glass")"}) {
+    const Image image =
+        render({"integrator.material={" + material + "}", without_box, "integrator.radius.typical=0.1"});
+    pictures.insert(channel(image, "R"));
+  }
+  EXPECT_EQ(pictures.size(), 5u);
+}
+
+TEST_F(Paths, PreviewsNeedNoLights) {
+  const std::string dark = R"(lights=[{"kind": "constant", "strength": 0}])";
+  EXPECT_EQ(sum(channel(render({transparent, dark}), "R")), 0);
+  for (const std::string shading : {"ambient_occlusion", "headlight"}) {
+    const Image image = render({transparent, "integrator.shading=" + shading, dark});
+    EXPECT_GT(sum(channel(image, "R")), 1) << shading;
+    const std::vector<float> red = channel(image, "R"), albedo = channel(image, "albedo.R");
+    for (std::size_t i = 0; i < red.size(); ++i) EXPECT_LE(red[i], albedo[i] + 0.02f) << shading;
+  }
+}
+
+/// A path down from the origin that turns aside by one unit after a way of 1, and goes on down.
+Path path_of(double wavelength, double aside) {
+  Path path;
+  path.wavelength = wavelength;
+  for (const Vector3d& position :
+       {Vector3d(0, 0, 0), Vector3d(0, 0, -1), Vector3d(aside, 0, -2), Vector3d(aside, 0, -3)}) {
+    PathPoint point;
+    point.position = position;
+    path.points.push_back(point);
+  }
+  return path;
+}
+
+std::vector<std::vector<Vector3d>> colors_of(const std::vector<Path>& paths, double radius) {
+  PathColorDescription description;
+  description.by = PathColor::wavelength;
+  return path_colors(description, paths, radius).of_points;
+}
+
+/// Where paths of one seed lie in one another they have one colour, so that it does not matter which is seen.
+TEST(PathColors, WavelengthsMixUntilTheyPart) {
+  const std::vector<Path> paths{path_of(450, 0), path_of(550, 1), path_of(650, 2)};
+  const auto colors = colors_of(paths, 0.4);
+  const Vector3d mean = (wavelength_color(450) + wavelength_color(550) + wavelength_color(650)) / 3;
+  for (std::size_t path = 0; path < paths.size(); ++path) {
+    for (const std::size_t point : {0, 1}) EXPECT_TRUE(colors[path][point].isApprox(mean)) << path << point;
+    for (const std::size_t point : {2, 3})
+      EXPECT_TRUE(colors[path][point].isApprox(wavelength_color(paths[path].wavelength))) << path << point;
+  }
+}
+
+/// Of red, green and blue, red comes first.
+TEST(PathColors, FallingWavelengthsMixToo) {
+  const auto colors = colors_of({path_of(650, 0), path_of(450, 1), path_of(650, 0), path_of(450, 1)}, 0.5);
+  const Vector3d mean = (wavelength_color(450) + wavelength_color(650)) / 2;
+  for (const auto& path : colors) EXPECT_TRUE(path[0].isApprox(mean));
+}
+
+/// At half the radius from another path, its colour counts half.
+TEST(PathColors, MixByTheirDistance) {
+  const auto colors = colors_of({path_of(450, 0), path_of(650, 1)}, 2);
+  EXPECT_TRUE(colors[0][3].isApprox((wavelength_color(450) + 0.5 * wavelength_color(650)) / 1.5));
+}
+
+/// Paths have none of the colours of another seed.
+TEST(PathColors, SeedsDoNotMix) {
+  const auto colors = colors_of({path_of(450, 0), path_of(650, 0), path_of(550, 0), path_of(700, 0)}, 1);
+  EXPECT_TRUE(colors[0][0].isApprox((wavelength_color(450) + wavelength_color(650)) / 2));
+  EXPECT_TRUE(colors[3][0].isApprox((wavelength_color(550) + wavelength_color(700)) / 2));
 }
 
 }  // namespace

@@ -2,19 +2,11 @@
 /// @file tests/scenes/pictures/pictures.h
 /// Renders small scenes as `tensorray render` does, in the process of the test.
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <optional>
 #include <regex>
 #include <stdexcept>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 
@@ -25,15 +17,18 @@
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
+#include "tests/files.h"
+
+namespace tensorray {
+namespace test {}
+using namespace test;
+}  // namespace tensorray
 
 namespace tensorray::test {
 
 using Settings = std::vector<std::string>;
 
-inline std::string read_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+inline std::string read_file(const std::filesystem::path& path) { return bytes_of(path); }
 
 /// The named channel of a picture, by pixel.
 inline std::vector<float> channel(const Image& image, const std::string& name) {

@@ -1,14 +1,21 @@
 // The method photon_distribution: colours, places and statistics of light on a plate.
 
+#include <numeric>
+
 #include <fmt/format.h>
 
+#include "base/process/progress.h"
+#include "integrators/methods/read_scene.h"
+#include "renderer/film/spectral_image.h"
+#include "scenes/scene/render.h"
+#include "scenes/scene/scene.h"
 #include "tests/scenes/pictures/pictures.h"
 #include "tests/scenes/small_scene.h"
 
 namespace tensorray {
 namespace {
 
-using namespace test;
+using nlohmann::json;
 
 class PlatePicture : public Pictures {
  protected:
@@ -112,24 +119,157 @@ TEST_F(PlatePicture, BalancesWithEveryMethodAndEnd) {
   }
 }
 
-TEST_F(PlatePicture, HasStatisticsThatBalance) {
+TEST_F(PlatePicture, HasStatistics) {
   render({"field.scale=20"});
   const nlohmann::json& stats = statistics_;
-  const auto count = [&](const char* key) { return stats["photons"][key].get<std::uint64_t>(); };
-  EXPECT_EQ(count("emitted"), 4 * stats["positions"].get<std::uint64_t>());
-  std::uint64_t ended = count("deposited") + count("missed");
-  for (const auto& [reason, stopped] : stats["photons"]["stopped"].items()) ended += stopped.get<std::uint64_t>();
-  EXPECT_EQ(ended, count("emitted"));
-  EXPECT_GT(count("deposited"), 0u);
+  EXPECT_EQ(stats["photons"]["emitted"], 4 * stats["positions"].get<std::uint64_t>());
+  EXPECT_GT(stats["photons"]["deposited"], 0);
   ASSERT_EQ(stats["channels"].size(), 4u);
-  for (const auto& channel : stats["channels"]) {
-    EXPECT_EQ(channel["rays"]["emitted"], stats["positions"]);
-    EXPECT_GT(channel["ray_power"], 0);
-  }
+  for (const auto& channel : stats["channels"]) EXPECT_EQ(channel["rays"]["emitted"], stats["positions"]);
+  for (const auto& channel : stats["channels"]) EXPECT_GT(channel["ray_power"], 0);
   EXPECT_NEAR(stats["power"]["emitted"], 4, 1e-3);  // Irradiance 1 times the area of the beam's cross section.
   for (const char* key : {"ray_steps", "tensor_samples", "peak_memory_bytes"}) EXPECT_GT(stats[key], 0) << key;
   for (const char* phase : {"load", "trace", "density", "color", "write"})
     EXPECT_GE(stats["seconds"][phase], 0) << phase;
+}
+
+class MeshLight : public Pictures {
+ protected:
+  MeshLight() {
+    write("scene.json", R"({
+      "field": { "generate": { "kind": "point_load", "resolution": 33 }, "eigenvalues": "absolute", "scale": 6 },
+      "light": { "direction": [0, 0, -1], "wavelengths": { "count": 8 } },
+      "receiver": { "distance": 0.5, "size": [2.6, 2.6], "resolution": [96, 96] },
+      "integrator": { "type": "photon_distribution" }
+    })");
+  }
+};
+
+TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
+  const auto with_error = [&](double error) {
+    return render({"light.wavelengths.count=3", "receiver.resolution=[48,48]",
+                   fmt::format("integrator.density.error={}", error)});
+  };
+  const Image exact = with_error(0.03);
+  for (const double bound : {0.3, 0.1}) {
+    const double error = relative_distance(with_error(bound), exact);
+    const double estimate = statistics_["error"].get<double>();
+    EXPECT_LE(estimate, bound);
+    EXPECT_LT(error, estimate);
+    EXPECT_GT(error, estimate / 20);
+  }
+}
+
+/// The magnification is that of the displacement, from pixel to pixel.
+TEST_F(MeshLight, TheMapsChannelsDescribeOneMap) {
+  const Image image = render({});
+  const auto index = [&](const std::string& name) {
+    return std::find(image.channels.begin(), image.channels.end(), name) - image.channels.begin();
+  };
+  const auto dx = index("displacement.x"), dy = index("displacement.y"), log = index("magnification.log"),
+             major = index("magnification.major"), minor = index("magnification.minor"), folds = index("folds");
+  const double pixel = 2.6 / 96;
+  int compared = 0;
+  for (int y = 1; y < 95; ++y)
+    for (int x = 1; x < 95; ++x) {
+      const float* const here = image.pixel(x, y);
+      EXPECT_NEAR(here[log], here[major] + here[minor], 1e-4);
+      EXPECT_GE(here[major], here[minor]);
+      if (std::hypot(x - 47.5, y - 47.5) > 25 || here[folds] != 1) continue;  // Within the bright disc.
+      // By the position across the beam where the light of neighbouring pixels starts; y of the plate is along −y.
+      const auto slope = [&](const float* after, const float* before, int axis) {
+        return (axis == 0 ? after[dx] - before[dx] : after[dy] - before[dy]) / (2 * pixel);
+      };
+      const float *right = image.pixel(x + 1, y), *left = image.pixel(x - 1, y), *above = image.pixel(x, y - 1),
+                  *below = image.pixel(x, y + 1);
+      const double a = 1 - slope(right, left, 0), b = -slope(above, below, 0), c = -slope(right, left, 1),
+                   d = 1 - slope(above, below, 1);
+      EXPECT_NEAR(-std::log(std::abs(a * d - b * c)), here[log], 0.15) << x << " " << y;
+      ++compared;
+    }
+  EXPECT_GT(compared, 1000);
+}
+
+TEST_F(MeshLight, OtherOutputsDoNotChangeThePicture) {
+  const Image alone = render({"light.photons=50000"});
+  const Image beside = render({"light.photons=50000", "light.wavelengths.per_photon=1"},
+                              {"out.spectral.exr", "photons.vdb", "light.fluence.vdb"});
+  EXPECT_EQ(alone.pixels, beside.pixels);
+  EXPECT_EQ(read_image(in_folder("out.spectral.exr")).channels.size(), 3 + 8u);
+  EXPECT_GT(std::filesystem::file_size(in_folder("photons.vdb")), 1000u);
+  EXPECT_GT(std::filesystem::file_size(in_folder("light.fluence.vdb")), 1000u);
+}
+
+TEST_F(MeshLight, SettingsWithoutEffectAndErrorsThatCannotBeReachedAreTold) {
+  const std::pair<Settings, const char*> cases[] = {
+      {{"integrator.density.tau=3"}, "`/integrator/density/tau` has no effect"},
+      {{"integrator.density.error=0.01", "integrator.density.kind=histogram"},
+       "`/integrator/density/error` has no effect: it belongs to the density \"mesh\""},
+      {{"integrator.density.error=0.001"}, "raise `light.photons`"}};
+  for (const auto& [settings, warning] : cases) {
+    Settings few = settings;
+    few.push_back("light.photons=2000");
+    render(few);
+    EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr(warning)));
+  }
+}
+
+// Light that leaves a volume by its side faces (integrator.side_light).
+/// Light of one colour on a plate that catches all of it. @param s  Its flexibility. @param side_light  Null: default.
+Render light_of(const std::string& density, double s, const Json& side_light) {
+  Json json{{"field",
+             {{"generate", {{"kind", "constant"}, {"resolution", 9}, {"tensor", {{0, 0, 1}, {0, 0, 0}, {1, 0, 0}}}}},
+              {"eigenvalues", "raw"},
+              {"scale", 1}}},
+            {"bending", {{"rgb", {s, s, s}}}},
+            {"light", {{"direction", {0, 0, -1}}, {"photons", 60000}}},
+            {"receiver", {{"distance", 0.1}, {"size", {8, 8}}, {"resolution", {256, 256}}}},
+            {"integrator", {{"type", "photon_distribution"}, {"density", {{"kind", density}}}}}};
+  if (!side_light.is_null()) json["integrator"]["side_light"] = side_light;
+  return render(load_scene(read_scene_json(json, "scene.json"), Progress()), Progress());
+}
+
+/// Power by end, as a part of what is emitted.
+double share(const Render& render, RayEnd which) {
+  double power = 0, all = 0, emitted = render.statistics.beam_power;
+  for (std::size_t channel = 0; channel < render.statistics.ends.size(); ++channel)
+    for (int end = 0; end < ray_end_count; ++end) {
+      const double each = render.statistics.power.empty() ? static_cast<double>(render.statistics.ends[channel][end])
+                                                          : render.statistics.power[channel][end];
+      all += each;
+      if (end == static_cast<int>(which)) power += each;
+    }
+  for (const std::uint64_t count : render.statistics.emitted)
+    emitted += render.statistics.power.empty() ? static_cast<double>(count) : 0;
+  EXPECT_NEAR(all / emitted, 1, 1e-6);
+  return power / emitted;
+}
+
+/// In this field V = (sin θ, 0, −cos θ) turns by θ' = −s cos 2θ. All light is displaced alike, by x on its way from
+/// z = 1 to z = −1, and the part |x| / 2 leaves by the sides.
+double displaced_part(double s) {
+  double angle = 0, x = 0, z = 1;
+  for (const double h = 1e-5; z > -1; x += h * std::sin(angle), z -= h * std::cos(angle))
+    angle -= h * s * std::cos(2 * angle);
+  return std::abs(x) / 2;
+}
+
+/// What is left out is what the plate lacks: no power is lost, with photons and with the mesh.
+TEST(SideLight, IsLeftOutAndCounted) {
+  const double s = 0.3;
+  for (const std::string density : {"mesh", "histogram"}) {
+    const Render with = light_of(density, s, true), without = light_of(density, s, false);
+    const double side = share(without, RayEnd::side);
+    EXPECT_NEAR(side, displaced_part(s), 0.01) << density;
+    EXPECT_NEAR(share(with, RayEnd::plate), 1, 1e-3) << density;
+    EXPECT_NEAR(share(without, RayEnd::plate), 1 - side, 1e-3) << density;
+    const double lit_with = std::accumulate(with.linear.pixels.begin(), with.linear.pixels.end(), 0.0);
+    const double lit_without = std::accumulate(without.linear.pixels.begin(), without.linear.pixels.end(), 0.0);
+    // The volume is 64 pixels wide; the mesh knows the edge of the light that is left to one of them.
+    EXPECT_NEAR(lit_without / lit_with, 1 - side, 1.0 / 64) << density;
+    ASSERT_EQ(without.warnings.size(), 1u) << density;
+    EXPECT_THAT(without.warnings[0], HasSubstr("side faces")) << density;
+  }
 }
 
 }  // namespace

@@ -58,7 +58,8 @@ TEST_F(Polariscope, ColoursAreThoseOfTheInterferenceChart) {
 
 TEST_F(Polariscope, ChannelsAreRetardanceAndDirections) {
   const double h = thickness();
-  // 0.3 and 1.7 orders of 545 nm, the middle of the band nearest to 550 nm: the principal value is below half an order, and then the slow axis is the other one.
+  // 0.3 and 1.7 orders of 545 nm, the middle of the band nearest to 550 nm: the principal value is below half an order,
+  // and then the slow axis is the other one.
   for (const auto& [orders, wrapped, azimuth] : {std::tuple(0.3, 0.3, 0.0), std::tuple(1.7, 0.3, pi / 2)}) {
     const double C = orders * 545e-9 / (8e6 * h);
     const Image image = render({fmt::format("integrator.stress_optic={}", C)});

@@ -1,11 +1,5 @@
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <random>
-#include <string>
 #include <utility>
-
-#include <gtest/gtest.h>
 
 #include "tests/tracing/support.h"
 #include "tracing/steps/scalar_tracer.h"
@@ -15,9 +9,6 @@
 
 namespace tensorray::test {
 namespace {
-
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 /// Closed, convex and outwards.
 using Parts = std::vector<TriangleMesh>;

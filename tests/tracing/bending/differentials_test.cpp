@@ -1,16 +1,11 @@
 // Ray differentials against finite differences of the rays themselves, and against closed forms.
 
-#include <cmath>
-
-#include <gtest/gtest.h>
-
 #include "tests/tracing/support.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
 namespace {
 
-using Eigen::Vector3d;
 using test::Ray;
 
 /// One ray with its derivatives along the two axes across its direction.

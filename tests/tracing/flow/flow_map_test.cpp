@@ -1,26 +1,21 @@
-// The flow map, and the light that it carries to its plate.
-
 #include "tracing/flow/flow_map.h"
 
-#include <cmath>
-#include <numeric>
-
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
+#include <cstring>
+#include <functional>
 
 #include "base/constants.h"
+#include "base/process/job.h"
 #include "integrators/photon_distribution/photon_distribution.h"
+#include "tests/base/rank_support.h"
 #include "tests/tracing/flow_support.h"
 #include "tracing/flow/ray_memory.h"
+#include "tracing/flow/wavelength_tracer.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
 namespace {
 
-using namespace test;
-using Eigen::Matrix3d;
-using Eigen::Vector2d;
-using Eigen::Vector3d;
+using Eigen::Vector2f;
 
 /// What `photons` single photons of the same light give, with the standard deviation of the noise of their number.
 Film histogram(const FlowBench& bench, double flexibility, std::uint64_t photons) {
@@ -215,23 +210,6 @@ TEST(FlowMap, SideLightOfARangeIsLeftOutAtEachWavelength) {
   }
 }
 
-TEST(FlowMap, TheSameOnAnyNumberOfThreads) {
-  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 64));
-  std::vector<Caustic> caustics;
-  for (const std::size_t threads : {1, 2, 8}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    const FlowMap map = map_of(bench, range(0.1, 0.6));
-    std::vector<CausticBand> bands;
-    for (int i = 0; i < 20; ++i) bands.push_back({(i + 0.5) / 20 * 32, 1.6, 0, 0.05, Vector3d(0.05, 0.1, i)});
-    caustics.push_back(caustic_of(bench, map, bands));
-  }
-  for (const Caustic& caustic : caustics) {
-    EXPECT_EQ(caustic.irradiance.values, caustics[0].irradiance.values);
-    EXPECT_EQ(caustic.color.values, caustics[0].color.values);
-    EXPECT_EQ(caustic.power, caustics[0].power);
-  }
-}
-
 /// Where large quads are smooth, their light is even within a triangle, which is of first order in their size: the
 /// error falls by more than half with a quarter of the tolerance, and by more where quads are near a pixel.
 TEST(FlowMap, ConvergesWithItsTolerance) {
@@ -285,6 +263,249 @@ TEST(FlowMap, CanBeCancelled) {
   Progress progress;
   progress.cancelled = true;
   EXPECT_THROW(trace_flow_map(bench.field, bench.geometry, bench.beam, {}, single(0.1), progress), Cancelled);
+}
+
+// Landings at the samples that are not traced.
+/// A map of vertices on a line; their light moves with the sample t, from 0 to 1, as `landing` says.
+FlowMap small_map(const std::vector<double>& vertices, const std::function<Vector2f(double, double)>& landing) {
+  FlowMap map;
+  map.wavelengths = range_samples;
+  for (const double x : vertices)
+    for (std::size_t sample = 0; sample < range_samples; ++sample) {
+      map.landings.push_back(landing(x, static_cast<double>(sample) / (range_samples - 1)));
+      map.ends.push_back(RayEnd::plate);
+    }
+  return map;
+}
+
+/// Forgets what is not traced of the last of three vertices, predicts it, and returns the greatest error; -1 if it is
+/// not predicted.
+double error_of(FlowMap map, const Parents& parents, std::size_t step, float tolerance) {
+  const FlowMap exact = map;
+  const std::size_t first = 2 * range_samples;
+  for (std::size_t sample = 0; sample < range_samples; ++sample) {
+    if (sample % step == 0) continue;
+    map.landings[first + sample].setConstant(std::nanf(""));
+    map.ends[first + sample] = RayEnd::missed;
+  }
+  if (!WavelengthPrediction(map, 2, parents, {100, 100}).predict(step, tolerance)) return -1;
+  float greatest = 0;
+  for (std::size_t sample = 0; sample < range_samples; ++sample) {
+    EXPECT_EQ(map.ends[first + sample], RayEnd::plate);
+    greatest = std::max(greatest, (map.landings[first + sample] - exact.landings[first + sample]).norm());
+  }
+  return greatest;
+}
+
+const Parents both{{0, 1}, 2};
+
+Vector2f smooth(double x, double t) {
+  return Vector2f(static_cast<float>(40 + 3 * x + 10 * std::sin(2 * t + 0.2 * x)), static_cast<float>(50 - 20 * t * t));
+}
+
+TEST(WavelengthPrediction, CubicsAreExact) {
+  const FlowMap map = small_map({0, 1, 0.5}, [](double x, double t) {
+    return Vector2f(static_cast<float>(40 + x + 10 * t * t * t), static_cast<float>(50 - 20 * t * t));
+  });
+  // Five samples: the second one deviates from a parabola by 10 · 3/64 pixels.
+  EXPECT_EQ(error_of(map, {}, 8, 0.468f), -1);
+  EXPECT_NEAR(error_of(map, {}, 8, 0.47f), 0, 1e-5);
+}
+
+/// The error of a cubic through samples at a distance h is at most 1/24 h⁴ times the fourth derivative, here 160: it
+/// falls to a sixteenth with half the distance.
+TEST(WavelengthPrediction, IsOfFourthOrder) {
+  const FlowMap map = small_map({0, 1, 0.5}, smooth);
+  const double coarse = error_of(map, {}, 8, 10), fine = error_of(map, {}, 4, 10);
+  EXPECT_LT(coarse, 160.0 / 24 * std::pow(0.25, 4));
+  EXPECT_GT(coarse, 1e-3);
+  EXPECT_NEAR(coarse / fine, 16, 5);
+}
+
+/// What the polynomials miss is the same of neighbours, to second order in their distance.
+TEST(WavelengthPrediction, ParentsLeaveOnlyWhatDiffers) {
+  const double alone = error_of(small_map({0, 1, 0.5}, smooth), {}, 8, 10);
+  const FlowMap far = small_map({0, 1, 0.5}, smooth), near = small_map({0, 0.5, 0.25}, smooth);
+  EXPECT_LT(error_of(far, both, 8, 10), alone / 50);
+  EXPECT_NEAR(error_of(far, both, 16, 10) / error_of(near, both, 16, 10), 4, 0.5);
+}
+
+TEST(WavelengthPrediction, ThreeSamplesNeedParentsThatAgree) {
+  const FlowMap map = small_map({0, 1, 0.5}, smooth);
+  EXPECT_EQ(error_of(map, {}, 16, 10), -1);
+  EXPECT_GE(error_of(map, both, 16, 0.1f), 0);
+  EXPECT_LT(error_of(map, both, 16, 0.1f), 0.1);
+  const FlowMap apart = small_map({0, 100, 50}, smooth);  // A parent of another phase.
+  EXPECT_EQ(error_of(apart, both, 16, 0.1f), -1);
+}
+
+/// Light that leaves by another face from sample 12 on.
+TEST(WavelengthPrediction, AKinkNeedsAllSamplesOnlyWhereItIs) {
+  FlowMap map = small_map({0, 1, 0.5}, [](double x, double t) {
+    return Vector2f(static_cast<float>(40 + x + 10 * std::max(t - 0.35, 0.0)), static_cast<float>(50 * t));
+  });
+  WavelengthPrediction prediction(map, 2, {}, {100, 100});
+  for (const std::size_t step : {8, 4, 2}) EXPECT_FALSE(prediction.predict(step, 0.02f)) << step;
+  for (const std::size_t sample : {10, 11, 14}) EXPECT_TRUE(prediction.is_open(sample)) << sample;
+  for (const std::size_t sample : {3, 18, 26, 31}) EXPECT_FALSE(prediction.is_open(sample)) << sample;
+  EXPECT_TRUE(prediction.predict(1, 0.02f));
+}
+
+/// Light of a parent that does not land says nothing about others.
+TEST(WavelengthPrediction, ParentsWhoseLightEndsElsewhereAreLeftOut) {
+  FlowMap map = small_map({0, 1, 0.5}, smooth);
+  map.ends[5] = RayEnd::obstacle;
+  EXPECT_FALSE(WavelengthPrediction(map, 2, both, {100, 100}).parents_agree(16, 10));
+  EXPECT_EQ(error_of(map, both, 8, 10), error_of(map, {}, 8, 10));
+}
+
+// Flow maps whose vertices were traced in earlier runs or by shards, and whose map and light ranks make together: the
+// same bits, and hardly a ray more.
+/// Without symmetry, so that sums differ with their order.
+Eigen::Matrix3d skew_lens(const Eigen::Vector3d& at) {
+  return lens({1.1 * at.x() + 0.13 * at.y() + 0.07, 0.9 * at.y() - 0.21 * at.x() - 0.05, at.z()});
+}
+
+const FlowBench& bench() {
+  static const FlowBench bench = make_bench(skew_lens, plate_at(4, 2.4, 48));
+  return bench;
+}
+
+FlowMap map_with(FlowSettings settings, Job& job) {
+  settings.job = &job;
+  settings.is_kept = true;
+  return map_of(bench(), settings);
+}
+
+Caustic light_with(const FlowMap& map, Ranks* ranks) {
+  std::vector<CausticBand> bands(3);
+  for (std::size_t i = 0; i < bands.size(); ++i) {
+    bands[i].width = static_cast<double>(map.wavelengths - 1) / 3;
+    bands[i].sample = (static_cast<double>(i) + 0.5) * bands[i].width;
+    bands[i].channel = i;
+    bands[i].color = {0.2, 0.3 * static_cast<double>(i), 1};
+  }
+  return draw_caustic(map, bench().plate(), bands, {3, true, usual_step, ranks}, Progress());
+}
+
+void expect_same(const FlowMap& a, const FlowMap& b) {
+  EXPECT_TRUE(a.starts == b.starts);
+  EXPECT_TRUE(a.ends == b.ends);
+  EXPECT_TRUE(a.lengths == b.lengths);
+  EXPECT_EQ(a.triangles.size(), b.triangles.size());
+  EXPECT_TRUE(light_with(a, nullptr).irradiance.values == light_with(b, nullptr).irradiance.values);
+}
+
+/// What a shard keeps, which is as much of a map as it makes.
+Results shard_of(const FlowSettings& settings, WorkPart part, std::size_t& rays) {
+  Job shard(part);
+  shard.is_shard = true;
+  rays += map_with(settings, shard).rays;
+  EXPECT_EQ(shard.results().size(), 1u);
+  return shard.results();
+}
+
+TEST(KeptMap, OfShardsIsThatOfOneRun) {
+  std::vector<FlowSettings> all{single(0.3), range(0.1, 0.4)};
+  all.back().silhouette = false;  // Its vertices at the border are predicted, too.
+  for (const FlowSettings& settings : all) {
+    const FlowMap alone = map_of(bench(), settings);
+    for (const std::size_t count : {1, 3, 16}) {
+      std::size_t rays = 0;
+      Results results;
+      for (std::size_t index = 0; index < count; ++index)
+        for (const auto& each : shard_of(settings, {index, count}, rays)) results.insert(each);
+      Job merged({0, count}, results);
+      const FlowMap map = map_with(settings, merged);
+      expect_same(map, alone);
+      EXPECT_LE(map.rays, alone.rays / 100) << count;  // Few vertices have parents that no shard has.
+      EXPECT_LE(rays, alone.rays * 3 / 2) << count;    // Those on the borders of blocks are traced by two.
+    }
+  }
+}
+
+TEST(KeptMap, IsNotTracedAgain) {
+  const FlowSettings settings = range(0.1, 0.4);
+  Job quick, slow;
+  map_with(settings, quick);
+  EXPECT_TRUE(quick.results().empty());
+  slow.interval = 1e-9;
+  const FlowMap alone = map_with(settings, slow);
+  Job same({}, slow.results());
+  const FlowMap map = map_with(settings, same);
+  EXPECT_EQ(map.rays, 0u);
+  expect_same(map, alone);
+  FlowSettings finer = settings, other = range(0.1, 0.5);
+  finer.tolerance = 0.25;
+  for (const FlowSettings& each : {finer, other}) {
+    Job job({}, slow.results());
+    EXPECT_EQ(map_with(each, job).rays, map_of(bench(), each).rays);
+  }
+}
+
+/// What no light does would be an index, or a place, beyond all memory.
+TEST(KeptMap, LandingsThatNoLightHasAreRefused) {
+  const FlowSettings settings = single(0.3);
+  std::size_t rays = 0;
+  const Results kept = shard_of(settings, {}, rays);
+  const auto map_of_bytes = [&](const std::string& bytes) {
+    Job job({}, {{kept.begin()->first, std::make_shared<const std::string>(bytes)}});
+    map_with(settings, job);
+  };
+  const std::string right = *kept.begin()->second;
+  // The key of a vertex has 24 bytes.
+  constexpr std::size_t landing = 24, end = landing + 2 * sizeof(float);
+  for (const int wrong : {ray_end_count, 255}) {
+    std::string bytes = right;
+    bytes[end] = static_cast<char>(wrong);
+    EXPECT_THROW(map_of_bytes(bytes), DamagedArchive) << wrong;
+  }
+  std::string bytes = right;
+  const float infinite = INFINITY;
+  std::memcpy(&bytes[landing], &infinite, sizeof infinite);
+  bytes[end] = static_cast<char>(RayEnd::plate);
+  EXPECT_THROW(map_of_bytes(bytes), DamagedArchive);
+  EXPECT_THROW(map_of_bytes(right + "x"), DamagedArchive);
+  EXPECT_NO_THROW(map_of_bytes(right));
+}
+
+TEST(RankMap, AndItsLightAreThoseOfOneProcess) {
+  for (const FlowSettings& settings : {single(0.3), range(0.1, 0.4)}) {
+    const FlowMap alone = map_of(bench(), settings);
+    const Caustic light = light_with(alone, nullptr);
+    for (const std::size_t count : {std::size_t{1}, std::size_t{3}}) {
+      std::vector<FlowMap> maps(count);
+      Caustic together;
+      run_ranks(count, [&](Ranks& ranks) {
+        Job job;
+        job.ranks = &ranks;
+        FlowSettings mine = settings;
+        mine.job = &job;
+        maps[ranks.rank()] = map_of(bench(), mine);
+        Caustic drawn = light_with(maps[ranks.rank()], &ranks);
+        if (is_root(&ranks)) together = std::move(drawn);
+      });
+      std::size_t rays = 0;
+      for (const FlowMap& map : maps) {
+        expect_same(map, alone);
+        rays += map.rays;
+      }
+      EXPECT_EQ(rays, alone.rays);  // No ray is traced twice.
+      EXPECT_TRUE(together.color.values == light.color.values) << count;
+      EXPECT_TRUE(together.irradiance.values == light.irradiance.values) << count;
+      EXPECT_TRUE(together.power == light.power) << count;
+    }
+  }
+}
+
+TEST(RankMap, OtherWorkIsRefused) {
+  StrangeRanks ranks;
+  Job job;
+  job.ranks = &ranks;
+  FlowSettings settings = single(0.3);
+  settings.job = &job;
+  EXPECT_THROW(map_of(bench(), settings), DamagedArchive);
+  EXPECT_THROW(light_with(map_of(bench(), single(0.3)), &ranks), DamagedArchive);
 }
 
 }  // namespace

@@ -1,27 +1,14 @@
 #include "tracing/flow_drawing/flow_irradiance.h"
 
-#include <algorithm>
-#include <cmath>
 #include <memory>
 #include <numeric>
 #include <optional>
-#include <vector>
 
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
-
-#include "base/process/job.h"
-#include "base/process/progress.h"
 #include "renderer/light_maps/photon_map.h"
-#include "tests/base/rank_support.h"
 #include "tests/tracing/support.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 
 Plate floor_plate(double size) {
   Plate plate;
@@ -94,33 +81,6 @@ TEST(FlowIrradianceTest, BentLightKeepsItsPower) {
   expect_power(lamp(source), solid_angle_of_top(source), 0.01 * solid_angle_of_top(source));
 }
 
-TEST(FlowIrradianceTest, OfRanksAndOfEarlierRunsIsThatOfOneProcess) {
-  const TensorField field = cube_field(9, [](const Vector3d& p) { return Matrix3d(p.asDiagonal()); });
-  LandingLight light = sun({0.2, 0.1, -1});
-  light.angle = 0.03;
-  light.passes = 2;
-  const FlowIrradiance alone = land(field, light, floor_plate(8));
-  const auto expect_same = [&](Job& job) {
-    const auto landed = flow_irradiance(field, surfaces_of(field), floor_plate(8), light, {{}, 64, 20000, &job, 3}, {});
-    ASSERT_TRUE(landed);
-    EXPECT_EQ(landed->plate.center, alone.plate.center);
-    EXPECT_TRUE(landed->irradiance.values == alone.irradiance.values);
-    EXPECT_TRUE(landed->folds == alone.folds);
-  };
-  Results kept;
-  run_ranks(3, [&](Ranks& ranks) {
-    Job job;
-    job.ranks = &ranks;
-    job.interval = 1e-9;
-    expect_same(job);
-    if (is_root(&ranks)) kept = job.results();
-  });
-  EXPECT_EQ(kept.size(), 2u);  // A direction is a unit.
-  kept.erase(kept.begin());
-  Job resumed({}, kept);
-  expect_same(resumed);
-}
-
 /// Light is even over each triangle, across which the irradiance changes by percents. Neighbours make up for this, but
 /// for a thousandth where quads of two sizes meet.
 TEST(FlowIrradianceTest, LightOfAPointFallsWithTheSquareOfTheDistance) {
@@ -145,17 +105,6 @@ TEST(FlowIrradianceTest, LightOfAPointFallsWithTheSquareOfTheDistance) {
 
 TEST(FlowIrradianceTest, APointWithinTheVolumeIsRefused) {
   EXPECT_THROW(land(constant_field(Matrix3d::Zero()), lamp({0.5, 0, 0}), floor_plate(12)), std::invalid_argument);
-}
-
-TEST(FlowIrradianceTest, IsTheSameOnAnyNumberOfThreads) {
-  const TensorField field = cube_field(17, linear_tensor);
-  std::vector<double> first;
-  for (const std::size_t threads : {1, 7}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    const FlowIrradiance landed = land(field, sun({0.2, 0.1, -1}), floor_plate(8));
-    if (first.empty()) first = landed.irradiance.values;
-    EXPECT_EQ(first, landed.irradiance.values) << threads;
-  }
 }
 
 /// A plane across the light, behind all of a body within 3 units of (0, 0, −2).

@@ -3,23 +3,15 @@
 
 #include "tracing/kernels/packet_kernel.h"
 
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <numeric>
-
-#include <gtest/gtest.h>
 
 #include "tests/tracing/packet_support.h"
 #include "volumes/making/generators.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 using PacketKernel = EveryInstructionSet;
 INSTANTIATE_TEST_SUITE_P(All, PacketKernel, test::instruction_sets(), instruction_set_name);
@@ -213,7 +205,6 @@ std::vector<Scene> unlike_scenes() {
   return scenes;
 }
 
-/// Rays `order` of a batch.
 RayBatch chosen(const RayBatch& rays, const std::vector<std::size_t>& order) {
   RayBatch result;
   result.wants_log_radiance_scale = rays.wants_log_radiance_scale;

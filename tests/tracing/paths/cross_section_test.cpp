@@ -1,19 +1,10 @@
 #include "tracing/paths/cross_section.h"
 
-#include <cmath>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
 #include "base/constants.h"
 #include "tests/tracing/support.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 
 CrossSectionSettings radii(double least, double greatest = 1e300) {
   CrossSectionSettings settings;
@@ -22,7 +13,6 @@ CrossSectionSettings radii(double least, double greatest = 1e300) {
   return settings;
 }
 
-/// A point of a way in the field.
 PathPoint point_of(const Vector3d& position, const Vector3d& direction, const Matrix3d& tensor) {
   PathPoint point;
   point.position = position;

@@ -1,25 +1,17 @@
 #include "tracing/paths/paths.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
-#include <gtest/gtest.h>
-#include <tbb/task_arena.h>
-
-#include "base/process/job.h"
-#include "tests/base/rank_support.h"
+#include "tests/tracing/packet_support.h"
 #include "tests/tracing/path_support.h"
 #include "tests/tracing/support.h"
+#include "tracing/paths/path_thinning.h"
 #include "tracing/steps/scalar_tracer.h"
 #include "tracing/trace/trace.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 
 PathSettings everything() {
   PathSettings settings;
@@ -176,27 +168,6 @@ TEST(Paths, WithoutTensorsFewerPointsHaveTheSamePositions) {
   for (const PathPoint& point : without.points) EXPECT_TRUE(point.tensor.isZero(0) && point.change.isZero(0));
 }
 
-TEST(Paths, AreTheSameOnAnyNumberOfThreads) {
-  const TensorField field = cube_field(33, linear_tensor);
-  const Geometry geometry(surfaces_of(field));
-  std::vector<PathSeed> seeds;
-  for (int i = 0; i < 300; ++i)
-    seeds.push_back(seed_at({std::sin(1.0 * i), std::cos(1.7 * i), 0.9 * std::sin(2.3 * i)}, 0.002 * i));
-  std::vector<std::vector<Path>> traced;
-  for (const int threads : {1, 2, 7})
-    tbb::task_arena(threads).execute(
-        [&] { traced.push_back(trace_paths(field, geometry, {}, seeds, {}, Progress())); });
-  for (std::size_t n = 1; n < traced.size(); ++n)
-    for (std::size_t i = 0; i < seeds.size(); ++i) {
-      ASSERT_EQ(traced[n][i].points.size(), traced[0][i].points.size());
-      for (std::size_t k = 0; k < traced[0][i].points.size(); ++k) {
-        ASSERT_EQ(traced[n][i].points[k].position, traced[0][i].points[k].position);
-        ASSERT_EQ(traced[n][i].points[k].tensor, traced[0][i].points[k].tensor);
-        ASSERT_EQ(traced[n][i].points[k].length, traced[0][i].points[k].length);
-      }
-    }
-}
-
 TEST(Paths, KeepsTheStraightPartsOnRequestAndSeparatesTheFaces) {
   const TensorField field = constant_field(general_tensor());
   Surfaces surfaces = surfaces_of(field);
@@ -246,24 +217,6 @@ TEST(Paths, ACutLeavesAStraightPieceWithin) {
   EXPECT_EQ(straight, 2);
 }
 
-/// More than one round of them.
-TEST(Paths, OfRanksAreThoseOfOneProcess) {
-  const TensorField field = cube_field(5, linear_tensor);
-  const Geometry geometry(surfaces_of(field));
-  std::vector<PathSeed> seeds;
-  for (int i = 0; i < 5000; ++i) seeds.push_back(seed_at({std::sin(1.0 * i), std::cos(1.7 * i), 2}, 2e-5 * i));
-  const std::vector<Path> alone = trace_paths(field, geometry, {}, seeds, {}, Progress());
-  std::vector<std::vector<Path>> paths(3);
-  run_ranks(paths.size(), [&](Ranks& ranks) {
-    Job job;
-    job.ranks = &ranks;
-    PathSettings settings;
-    settings.job = &job;
-    paths[ranks.rank()] = trace_paths(field, geometry, {}, seeds, settings, Progress());
-  });
-  for (const std::vector<Path>& each : paths) expect_same(each, alone);
-}
-
 TEST(Paths, OnePathASeedInTheirOrder) {
   const TensorField field = cube_field(9, linear_tensor);
   const Geometry geometry(surfaces_of(field));
@@ -297,6 +250,70 @@ TEST(Paths, StopsWhenCancelledAndRefusesNegativeTolerances) {
   settings = {};
   settings.tensor_tolerance = std::nan("");
   EXPECT_THROW(trace_paths(field, geometry, {}, {}, settings, Progress()), std::invalid_argument);
+}
+
+class PathThinning : public EveryInstructionSet {};
+INSTANTIATE_TEST_SUITE_P(All, PathThinning, instruction_sets(), instruction_set_name);
+
+/// A ray that was traced from a seed within the field, in both directions.
+struct Traced {
+  TensorField field;
+  std::vector<RayRecord> back, on;
+  JoinedRay ray;
+};
+
+Traced trace_both(const TensorField& field, const Vector3d& index, double flexibility) {
+  Traced traced{field, {}, {}, {}};
+  const Geometry geometry(surfaces_of(field));
+  for (const double sign : {1.0, -1.0}) {
+    RayBatch batch;
+    batch.add(field.to_world() * index, sign * Vector3d(0.3, -0.2, 1).normalized(), sign * flexibility);
+    const BendingSettings settings = settings_of(BendingMethod::splitting4, 0.5);  // In packets, with many points.
+    trace(field, geometry, settings, batch, sign > 0 ? &traced.on : &traced.back);
+  }
+  join(field, traced.back[0], traced.on[0], traced.ray);
+  return traced;
+}
+
+Traced bent_ray(double flexibility = 0.2) {
+  const TensorFunction smooth = smooth_tensor(3);
+  const auto strong = [&](const Vector3d& p) { return Matrix3d(smooth(p) + 0.2 * Matrix3d::Identity()); };
+  return trace_both(lattice_field(odd_box(), lattices()[2], strong), {3, 20, 5}, flexibility);
+}
+
+PathPoints all_points(const Traced& traced) {
+  PathPoints points;
+  for (const JoinedPoint& joined : traced.ray.points) {
+    points.push_back(joined.point);
+    for (std::size_t i = 0; i < joined.steps.count; ++i)
+      points.push_back(path_point(traced.field, traced.ray, joined.steps, i));
+  }
+  return points;
+}
+
+/// The error of each point between two that stay, in the tolerances' units, in double precision.
+TEST_P(PathThinning, KeepsItsTolerances) {
+  for (const double flexibility : {0.05, 0.2, 0.8}) {
+    const Traced traced = bent_ray(flexibility);
+    const PathPoints points = all_points(traced);
+    PathSamples samples;
+    sample_path(traced.field, traced.ray, true, samples);
+    const std::vector<std::size_t> chosen = thinned(samples, 0.05, 0.02);
+    EXPECT_LT(chosen.size(), points.size() / 2);
+    TensorSampler sampler(traced.field);
+    const auto tensor = [&](const PathPoint& p) {
+      return p.in_field ? Matrix3d(sampler.at(p.position)) : Matrix3d::Zero();
+    };
+    for (std::size_t n = 1; n < chosen.size(); ++n)
+      for (std::size_t k = chosen[n - 1] + 1; k < chosen[n]; ++k) {
+        const PathPoint &a = points[chosen[n - 1]], &b = points[chosen[n]], &p = points[k];
+        const double t = (p.length - a.length) / (b.length - a.length);
+        const Matrix3d from = tensor(a), to = tensor(b), here = tensor(p);
+        EXPECT_LT((a.position + t * (b.position - a.position) - p.position).norm(), 1.001 * 0.05 * mean_edge);
+        EXPECT_LT((from + t * (to - from) - here).norm(),
+                  1.001 * 0.02 * std::max({from.norm(), to.norm(), here.norm()}));
+      }
+  }
 }
 
 }  // namespace

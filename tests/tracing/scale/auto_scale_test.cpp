@@ -2,16 +2,10 @@
 
 #include <cmath>
 
-#include <gtest/gtest.h>
-
 #include "tests/tracing/support.h"
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 
 AutoScale scale_of(const TensorField& field, const Vector3d& direction = {0, 0, -1}) {
   return choose_scale(field, Geometry(surfaces_of(field)),

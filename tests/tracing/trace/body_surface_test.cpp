@@ -1,13 +1,7 @@
 // Rays through bodies that end at their surface, against rays through the formula within the true surface.
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <functional>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "base/constants.h"
 #include "tests/tracing/support.h"
@@ -15,11 +9,6 @@
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 constexpr double across = 1.4;  // Width of the bodies, which lie within 0.8 of the origin.
 constexpr double plate_height = 1.2, start_height = -1.2, body_flexibility = 0.6;
@@ -143,7 +132,6 @@ TensorField body_field(const Body& body, const TensorFunction& T, int voxels, co
   return TensorField(grid, {between, Border::extend});
 }
 
-/// The rays that do not graze, and where they land.
 struct Truth {
   std::vector<BeamStart> starts;
   std::vector<Vector3d> landings;

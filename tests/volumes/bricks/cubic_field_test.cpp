@@ -1,12 +1,9 @@
 // A cubic field: what it reproduces, what it does at borders, and that all readers see the same.
 
-#include <cmath>
 #include <functional>
 #include <random>
-#include <vector>
 
-#include <gtest/gtest.h>
-
+#include "tests/names.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/tensor_grid.h"
 #include "volumes/sampling/tensor_sampler.h"
@@ -14,15 +11,9 @@
 namespace tensorray {
 namespace {
 
-using Eigen::AlignedBox3i;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
-
 constexpr Interpolant fading{Interpolation::cubic, Border::fade}, extending{Interpolation::cubic, Border::extend};
 constexpr double rounding = 4e-6;  // Of single precision, for values of 1: a coefficient is a sum of some 10 of them.
 
-/// A transform that turns, shears and scales.
 Eigen::Affine3d sheared() {
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
   to_world.linear() << 0.5, 0.1, 0, -0.2, 0.3, 0.05, 0, 0.1, 0.8;
@@ -223,7 +214,6 @@ TEST(CubicField, TheBoundHoldsForValuesOfAnySize) {
   }
 }
 
-/// The bound of a brick holds everywhere in it.
 TEST(CubicField, NoDeviatorExceedsTheBoundOfItsBrick) {
   const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(17, 17, 17)), sheared(),
                                      [](auto& index) {

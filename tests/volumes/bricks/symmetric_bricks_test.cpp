@@ -1,13 +1,10 @@
 // Tests that fields of symmetric tensors take less memory, and hold the same tensors as others.
 
 #include <array>
-#include <cmath>
 #include <limits>
 #include <random>
-#include <vector>
 
-#include <gtest/gtest.h>
-
+#include "tests/names.h"
 #include "volumes/bricks/brick_layout.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/block_source.h"
@@ -16,11 +13,6 @@
 namespace tensorray {
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
-
-/// Random symmetric tensors.
 TensorGrid symmetric_grid(const Vector3i& first, const Vector3i& last) {
   TensorGrid grid =
       dense_grid({first, last}, Eigen::Affine3d::Identity(), [](const Vector3i&) { return Matrix3d::Zero(); });
@@ -37,7 +29,6 @@ TensorGrid symmetric_grid(const Vector3i& first, const Vector3i& last) {
   return grid;
 }
 
-/// The tensor of the first active voxel.
 Eigen::Matrix3f& first_tensor(TensorGrid& grid) {
   TensorBlock& block = grid.blocks.front();
   int i = 0;

@@ -2,8 +2,6 @@
 
 #include <fstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 
@@ -13,13 +11,6 @@ namespace tensorray {
 namespace {
 
 namespace fs = std::filesystem;
-using Eigen::Matrix3d;
-using Eigen::Matrix3f;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 TEST(TensorFiles, HalfRoundTripErrsByHalfsPrecision) {
   const TensorGrid grid = sparse_grid();

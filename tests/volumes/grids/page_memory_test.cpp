@@ -2,24 +2,25 @@
 
 #include "volumes/grids/page_memory.h"
 
-#include <algorithm>
 #include <array>
 #include <deque>
 #include <fstream>
 #include <iostream>
-#include <string>
-#include <vector>
 
-#include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 #include <unistd.h>
 
 #include "base/files/temporary_folder.h"
-#include "tests/thread_sanitizer.h"
-#include "tests/volumes/file_size_limit.h"
+#include "tests/files.h"
 
 namespace tensorray {
 namespace {
+
+#ifdef __has_feature  // Clang, which the preset `tsan` uses.
+constexpr bool has_thread_sanitizer = __has_feature(thread_sanitizer);
+#else
+constexpr bool has_thread_sanitizer = false;
+#endif
 
 constexpr std::size_t large = std::size_t{64} << 20;
 
@@ -113,7 +114,7 @@ TEST(SlotMemory, HoldsWhatADequeDoesToIt) {
 }
 
 TEST(SlotMemory, IsGivenBackWhileTheRestIsUsed) {
-  if (test::has_thread_sanitizer) GTEST_SKIP() << "the sanitizer's own memory is larger";
+  if (has_thread_sanitizer) GTEST_SKIP() << "the sanitizer's own memory is larger";
   constexpr double slab = 1 << 23;
   const auto before = static_cast<double>(own_bytes());
   Deque numbers = make(0, 5000);

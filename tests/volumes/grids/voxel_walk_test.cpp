@@ -1,16 +1,11 @@
 #include "volumes/grids/voxel_walk.h"
 
 #include <random>
-#include <vector>
 
-#include <gtest/gtest.h>
+#include "tests/names.h"
 
 namespace tensorray {
 namespace {
-
-using Eigen::AlignedBox3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 struct Part {
   Vector3i voxel;

@@ -1,11 +1,5 @@
 #include "volumes/points/point_files.h"
 
-#include <algorithm>
-#include <random>
-#include <tuple>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/points/AttributeArray.h>
 #include <openvdb/points/PointConversion.h>
@@ -14,14 +8,13 @@
 
 #include "tests/volumes/file_support.h"
 #include "tests/volumes/point_support.h"
+#include "volumes/points/vtk_files.h"
 
 namespace tensorray {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+using Arrays = std::map<std::string, DataArray>;
 
 openvdb::points::PointDataGrid::Ptr read_points(const fs::path& path) {
   openvdb::initialize();
@@ -101,20 +94,7 @@ TEST(VdbPoints, FewOrEqualPoints) {
   expect_records(records_of(*read_points(path)), cloud, 1e-5f);
 }
 
-TEST(PointFiles, FullDiskIsNoticed) {
-  const PointCloud cloud = cloud_of(20000, 0.5f);
-  const Temporary path("a.vdb");
-  write_points(path, cloud);
-  const auto size = fs::file_size(path);
-  for (const auto limit : {std::uintmax_t{0}, size / 50, size / 3, size / 2, size * 9 / 10, size - 1}) {
-    fs::remove(path);
-    const FileSizeLimit limited(limit);
-    testing::internal::CaptureStderr();
-    EXPECT_THAT([&] { write_points(path, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(path.string())))
-        << limit << " of " << size;
-    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-  }
-}
+TEST(PointFiles, FullDiskIsNoticed) { expect_full_disk_is_noticed("a.vdb"); }
 
 TEST(PointFiles, RefuseOtherEndingsAndMissingValues) {
   PointCloud cloud = cloud_of(3, 0);
@@ -123,6 +103,39 @@ TEST(PointFiles, RefuseOtherEndingsAndMissingValues) {
   cloud.scalars["power"].pop_back();
   EXPECT_THAT([&] { write_points(Temporary("a.vdb"), cloud); },
               ThrowsMessage<std::invalid_argument>(HasSubstr("power")));
+}
+
+PolylineData some_lines() {
+  PolylineData lines;
+  lines.points = {{0, 1, 2}, {3, 4, 5}, {6, 7, 1e300}};
+  lines.line_ends = {2, 3};
+  lines.point_data = {{"force", {3, std::vector<double>(9, 1.5)}}, {"in field", {1, std::vector<double>{0, 1, 255}}}};
+  lines.line_data = {{"end", {1, std::vector<double>{-1, 7}}}};
+  return lines;
+}
+
+void expect_same(const Arrays& a, const Arrays& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (const auto& [name, array] : a) {
+    EXPECT_EQ(b.at(name).components, array.components);
+    EXPECT_EQ(b.at(name).values, array.values);
+  }
+}
+
+TEST(PolyLinesFile, IsReadAsItWasWrittenAndFailsWhereItIsCutOff) {
+  const Temporary path("a.poly");
+  const PolylineData lines = some_lines();
+  write_poly_lines(path, lines);
+  const PolylineData read = read_poly_lines(path);
+  EXPECT_EQ(read.points, lines.points);
+  EXPECT_EQ(read.line_ends, lines.line_ends);
+  expect_same(read.point_data, lines.point_data);
+  expect_same(read.line_data, lines.line_data);
+  const std::string bytes = bytes_of(path);
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    write_bytes(path, bytes.substr(0, size));
+    EXPECT_THROW(read_poly_lines(path), std::runtime_error) << size;
+  }
 }
 
 }  // namespace

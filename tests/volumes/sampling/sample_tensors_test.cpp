@@ -1,20 +1,13 @@
 
 #include <array>
-#include <cmath>
 #include <random>
-#include <vector>
 
-#include <gtest/gtest.h>
-
+#include "tests/names.h"
 #include "volumes/bricks/brick_point.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 namespace {
-
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 constexpr Interpolant cubic{Interpolation::cubic, Border::fade};
 
@@ -52,7 +45,6 @@ std::vector<Vector3d> index_points(const TensorField& field, std::size_t count) 
   return points;
 }
 
-/// Nine components of each point's tensor.
 std::vector<std::array<float, 9>> sampled(const TensorField& field, const std::vector<Vector3d>& points,
                                           const Vector3i& brick, float factor) {
   const std::size_t room = sampled_room(points.size());

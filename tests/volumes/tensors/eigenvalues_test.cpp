@@ -1,13 +1,10 @@
 #include "volumes/tensors/eigenvalues.h"
 
-#include <cmath>
 #include <complex>
 #include <random>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include "tests/volumes/grid_support.h"
@@ -15,8 +12,6 @@
 namespace tensorray {
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 using Complex = std::complex<double>;
 
 constexpr Eigenvalues both[] = {Eigenvalues::absolute, Eigenvalues::positive};

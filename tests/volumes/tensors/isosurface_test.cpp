@@ -1,20 +1,22 @@
 #include "volumes/tensors/isosurface.h"
 
-#include <cmath>
 #include <limits>
 #include <map>
+#include <random>
 #include <stdexcept>
 #include <utility>
 
-#include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include "base/constants.h"
+#include "tests/names.h"
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/making/generators.h"
+#include "volumes/tensors/invariants.h"
+#include "volumes/tensors/statistics.h"
 
 namespace tensorray {
 namespace {
-
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 const Vector3d center(0.11, -0.07, 0.05);
 
@@ -156,6 +158,191 @@ TEST(IsosurfaceTest, RefusesWhatHasNoSurface) {
   EXPECT_THROW(isosurface(cube(2), Invariant::norm, std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
   const TensorField flat = distance_field({Vector3i(0, 0, 0), Vector3i(4, 4, 0)}, Eigen::Affine3d::Identity());
   EXPECT_THROW(isosurface(flat, Invariant::norm, 1), std::invalid_argument);
+}
+
+Matrix3d matrix_of_rows(std::initializer_list<double> rows) {
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.begin());
+}
+
+TensorGrid stretched_grid(const std::function<Matrix3d(const Vector3i&)>& value) {
+  const Eigen::Affine3d to_world = Eigen::Translation3d(1, 2, 3) * Eigen::Scaling(0.5, 1.0, 2.0);
+  return dense_grid({Vector3i(-2, 0, 0), Vector3i(7, 9, 9)}, to_world, value);
+}
+
+TEST(FieldStatistics, DescribesTheExtent) {
+  const TensorGrid grid = stretched_grid([](const Vector3i&) { return Matrix3d::Identity(); });
+  const FieldStatistics s = field_statistics(grid);
+  EXPECT_EQ(s.active_voxels, 1000u);
+  EXPECT_EQ(s.non_finite, 0u);
+  EXPECT_EQ(s.index_box.min(), Vector3i(-2, 0, 0));
+  EXPECT_EQ(s.index_box.max(), Vector3i(7, 9, 9));
+  EXPECT_LE((s.voxel_size - Vector3d(0.5, 1, 2)).norm(), 1e-15);
+  EXPECT_LE((s.world_box.min() - Vector3d(0, 2, 3)).norm(), 1e-14);
+  EXPECT_LE((s.world_box.max() - Vector3d(4.5, 11, 21)).norm(), 1e-14);
+  EXPECT_EQ(s.memory_bytes, TensorField(grid).memory_bytes());
+  EXPECT_TRUE(std::isinf(s.stable_step(0.2)));  // Isotropic: no bending.
+}
+
+TEST(FieldStatistics, PercentilesOfTheNorm) {
+  // Norms 0 … 999, each once.
+  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
+    const double n = (i.x() + 2) * 100 + i.y() * 10 + i.z();
+    return n / std::sqrt(3.0) * Matrix3d::Identity();
+  });
+  const std::array<double, 7> expected{0, 10, 250, 500, 749, 989, 999};
+  const FieldStatistics s = field_statistics(grid);
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(s.norm[i], expected[i], 1e-4);
+}
+
+TEST(FieldStatistics, EigenvaluesAndFractions) {
+  // A tenth of the voxels (x = −2) has the eigenvalues −1 ± 3i and 4. The others are diag(5, 0, 0), neither complex nor
+  // negative.
+  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
+    if (i.x() == -2) return matrix_of_rows({-1, -3, 0, 3, -1, 0, 0, 0, 4});
+    return Vector3d(5, 0, 0).asDiagonal();
+  });
+  const FieldStatistics s = field_statistics(grid);
+  EXPECT_NEAR(s.real_min, -1, 1e-12);
+  EXPECT_NEAR(s.real_max, 5, 1e-12);
+  EXPECT_NEAR(s.imaginary_max, 3, 1e-12);
+  EXPECT_DOUBLE_EQ(s.complex_fraction, 0.1);
+  EXPECT_DOUBLE_EQ(s.negative_fraction, 0.1);
+  // Sums of squares per voxel: 36 (72 for T − Tᵀ), and 25.
+  EXPECT_NEAR(s.asymmetry, std::sqrt(0.1 * 72 / (0.1 * 36 + 0.9 * 25)), 1e-6);
+  // The deviator of diag(5, 0, 0) is diag(10/3, −5/3, −5/3). The deviator of the other tensor has the singular values
+  // |−5/3 ± 3i| (a normal block) and 10/3.
+  const double deviator = std::hypot(5.0 / 3, 3.0);
+  EXPECT_NEAR(s.deviator_max, deviator, 1e-12);
+  EXPECT_NEAR(s.stable_step(-0.2), 1 / (0.2 * deviator), 1e-12);
+  // The pair becomes √10 on its plane: of the voxel's 36, the 18 of the antisymmetric part are erased.
+  EXPECT_NEAR(s.absolute_loss, 0.1 * 18 / (0.1 * 36 + 0.9 * 25), 1e-12);
+}
+
+TEST(FieldStatistics, LeavesNonFiniteVoxelsOut) {
+  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
+    return (i.x() > 4 ? std::numeric_limits<double>::quiet_NaN() : 2.0) * Matrix3d::Identity();
+  });
+  const FieldStatistics s = field_statistics(grid);
+  EXPECT_EQ(s.active_voxels, 1000u);
+  EXPECT_EQ(s.non_finite, 300u);
+  EXPECT_EQ(s.index_box.max(), Vector3i(4, 9, 9));
+  EXPECT_NEAR(s.norm[6], 2 * std::sqrt(3.0), 1e-6);
+  EXPECT_EQ(s.real_max, 2);
+}
+
+TEST(FieldStatistics, OfNothingFinite) {
+  const TensorGrid grid = stretched_grid([](const Vector3i&) -> Matrix3d { return Matrix3d::Constant(INFINITY); });
+  const FieldStatistics s = field_statistics(grid);
+  EXPECT_EQ(s.non_finite, 1000u);
+  EXPECT_TRUE(s.index_box.isEmpty());
+  EXPECT_EQ(s.memory_bytes, 0u);
+}
+
+TEST(FieldStatistics, DoesNotDependOnThreads) {
+  const Vortex vortex;
+  const TensorGrid grid = generate(vortex, default_grid(vortex, 40));
+  const FieldStatistics many = field_statistics(grid);
+  const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
+  const FieldStatistics one = field_statistics(grid);
+  EXPECT_EQ(many.norm, one.norm);
+  EXPECT_EQ(many.absolute_loss, one.absolute_loss);
+  EXPECT_EQ(many.deviator_max, one.deviator_max);
+  EXPECT_EQ(many.complex_fraction, one.complex_fraction);
+}
+
+Matrix3d diagonal(double a, double b, double c) { return Vector3d(a, b, c).asDiagonal(); }
+
+Matrix3d cross_matrix(const Vector3d& axis) {
+  Matrix3d matrix;
+  for (int i = 0; i < 3; ++i) matrix.col(i) = axis.cross(Vector3d::Unit(i));
+  return matrix;
+}
+
+double of(const std::string& name, const Matrix3d& tensor) { return invariant(invariant_of(name), tensor); }
+
+TEST(InvariantTest, DiagonalTensors) {
+  const Matrix3d tensor = diagonal(2, -3, 6);
+  EXPECT_DOUBLE_EQ(of("norm", tensor), 7);
+  EXPECT_DOUBLE_EQ(of("trace", tensor), 5);
+  EXPECT_DOUBLE_EQ(of("determinant", tensor), -36);
+  EXPECT_NEAR(of("largest_eigenvalue", tensor), 6, 1e-14);
+  EXPECT_NEAR(of("middle_eigenvalue", tensor), 2, 1e-14);
+  EXPECT_NEAR(of("smallest_eigenvalue", tensor), -3, 1e-14);
+  EXPECT_NEAR(of("max_shear", tensor), 4.5, 1e-14);
+  EXPECT_NEAR(of("von_mises", tensor), std::sqrt((25 + 81 + 16) / 2.0), 1e-14);  // From the three differences.
+  EXPECT_EQ(of("vorticity", tensor), 0);
+  EXPECT_EQ(of("swirling_strength", tensor), 0);
+  EXPECT_EQ(of("asymmetry", tensor), 0);
+}
+
+TEST(InvariantTest, AnisotropyOfLinePlaneAndSphere) {
+  EXPECT_NEAR(of("fractional_anisotropy", diagonal(5, 0, 0)), 1, 1e-15);
+  EXPECT_NEAR(of("fractional_anisotropy", diagonal(0, 5, 5)), std::sqrt(0.5), 1e-15);
+  EXPECT_NEAR(of("fractional_anisotropy", diagonal(5, 5, 5)), 0, 1e-15);
+  EXPECT_NEAR(of("fractional_anisotropy", diagonal(1, 0, -1)), std::sqrt(1.5), 1e-15);
+  EXPECT_NEAR(of("fractional_anisotropy", diagonal(1.7, 0.3, 0.3)), 1.4 / std::sqrt(1.7 * 1.7 + 2 * 0.09), 1e-15);
+  EXPECT_NEAR(of("mode", diagonal(5, 1, 1)), 1, 1e-14);
+  EXPECT_NEAR(of("mode", diagonal(1, 5, 5)), -1, 1e-14);
+  EXPECT_NEAR(of("mode", diagonal(3, 2, 1)), 0, 1e-14);
+  EXPECT_EQ(of("mode", 3 * Matrix3d::Identity()), 0);
+  EXPECT_EQ(of("mode", diagonal(0.1f, 0.1 * (1 + 1e-7), 0.1)), 0);
+}
+
+TEST(InvariantTest, RotationAndShear) {
+  const Matrix3d rotation = cross_matrix({1, -2, 2});
+  EXPECT_NEAR(of("vorticity", rotation), 6, 1e-14);  // Twice the rate of rotation.
+  EXPECT_NEAR(of("swirling_strength", rotation), 3, 1e-14);
+  EXPECT_NEAR(of("asymmetry", rotation), 2, 1e-15);
+  EXPECT_EQ(of("fractional_anisotropy", rotation), 0);
+  EXPECT_EQ(of("max_shear", rotation), 0);
+  Matrix3d shear = Matrix3d::Zero();
+  shear(0, 2) = 4;
+  EXPECT_NEAR(of("vorticity", shear), 4, 1e-14);
+  EXPECT_NEAR(of("max_shear", shear), 2, 1e-14);
+  EXPECT_NEAR(of("von_mises", shear), 2 * std::sqrt(3.0), 1e-14);
+  EXPECT_NEAR(of("asymmetry", shear), std::sqrt(2.0), 1e-15);
+  // A pair 1 ± 2i and 5: ordered by real parts.
+  Matrix3d spiral = diagonal(1, 1, 5);
+  spiral(0, 1) = -2;
+  spiral(1, 0) = 2;
+  EXPECT_NEAR(of("largest_eigenvalue", spiral), 5, 1e-14);
+  EXPECT_NEAR(of("smallest_eigenvalue", spiral), 1, 1e-14);
+  EXPECT_NEAR(of("swirling_strength", spiral), 2, 1e-14);
+}
+
+TEST(InvariantTest, IsTheSameInAllAxesAndScalesWithItsDegree) {
+  std::mt19937 engine(5);
+  std::normal_distribution<double> normal;
+  const auto random = [&] { return normal(engine); };
+  for (int i = 0; i < 200; ++i) {
+    const Matrix3d tensor = Matrix3d::NullaryExpr(random);
+    const Eigen::Quaterniond turn = Eigen::Quaterniond(Eigen::Vector4d::NullaryExpr(random)).normalized();
+    const Matrix3d q = turn.toRotationMatrix();
+    for (const std::string& name : invariant_names()) {
+      const double value = of(name, tensor);
+      // A pair of nearly equal eigenvalues changes with the square root of rounding errors.
+      EXPECT_NEAR(of(name, q * tensor * q.transpose()), value, 1e-6 * (1 + std::abs(value))) << name;
+      const double power = name == "determinant" ? 3 : value == 0 || of(name, 2 * tensor) == value ? 0 : 1;
+      EXPECT_NEAR(of(name, 2 * tensor), std::pow(2, power) * value, 1e-12 * (1 + std::abs(value))) << name;
+    }
+  }
+}
+
+TEST(InvariantTest, IsFiniteForEveryFiniteTensorAndZeroForZero) {
+  const double largest = std::numeric_limits<double>::max(), least = std::numeric_limits<double>::denorm_min();
+  std::mt19937 engine(7);
+  std::uniform_int_distribution<int> choose(0, 6);
+  const double numbers[] = {0, 1, -1, largest, -largest, least, -1e-200};
+  for (const std::string& name : invariant_names()) {
+    EXPECT_EQ(of(name, Matrix3d::Zero()), 0) << name;
+    for (int i = 0; i < 300; ++i) {
+      const Matrix3d tensor = Matrix3d::NullaryExpr([&] { return numbers[choose(engine)]; });
+      EXPECT_TRUE(std::isfinite(of(name, tensor))) << name << " of\n" << tensor;
+    }
+  }
+  EXPECT_NEAR(of("norm", diagonal(3e-200, 4e-200, 0)) / 1e-200, 5, 1e-14);
+  EXPECT_NEAR(of("fractional_anisotropy", diagonal(1e300, 0, 0)), 1, 1e-15);
+  EXPECT_EQ(of("determinant", diagonal(1e200, 1e200, -1e200)), -largest);
 }
 
 }  // namespace

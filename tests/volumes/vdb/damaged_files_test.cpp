@@ -4,8 +4,6 @@
 #include <random>
 #include <tuple>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
 #include "base/text/byte_order.h"
@@ -16,9 +14,6 @@ namespace tensorray {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 /// Runs `read` on a file cut at every fiftieth of its length and at some lengths near its ends. Each call must throw
 /// one line that names the file.

@@ -1,13 +1,6 @@
 // Annotations of display pictures: what each method draws, where, and that no other file changes.
 
-#include <algorithm>
-#include <cmath>
 #include <optional>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "base/files/temporary_folder.h"
 #include "base/geometry/box.h"
@@ -17,11 +10,10 @@
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
+#include "tests/files.h"
 
 namespace tensorray {
 namespace {
-
-using ::testing::ElementsAre, ::testing::HasSubstr, ::testing::IsEmpty;
 
 constexpr int size = 200;  // Pixels along both sides of all pictures.
 
@@ -172,12 +164,7 @@ TEST(Captions, HaveTheValuesOfKeys) {
   EXPECT_EQ(caption("{lights.0.kind}{light.direction.2}"), "constant-1");
   EXPECT_EQ(caption("##: {field.scale}", 2), "02: 1");
   for (const char* wrong : {"{field.sclae}", "{field.scale", "{}", "{lights.1}", "{field.scale.x}", "{lights.}"}) {
-    try {
-      caption(wrong);
-      ADD_FAILURE() << wrong;
-    } catch (const SceneError& error) {
-      EXPECT_THAT(error.what(), HasSubstr("`/output/caption`")) << wrong;
-    }
+    EXPECT_THAT(message([&] { caption(wrong); }), HasSubstr("`/output/caption`")) << wrong;
   }
 }
 
@@ -193,14 +180,54 @@ TEST(Annotations, AreAListOfNames) {
   EXPECT_THAT(described({"legend", "scale"}).output.annotations, ElementsAre(Annotation::legend, Annotation::scale));
   EXPECT_THAT(described("axes").output.annotations, ElementsAre(Annotation::axes));
   for (const Json& wrong : {Json("bar"), Json({"axes", "bar"}), Json({"axes", "axes"}), Json(true), Json({1, 2})}) {
-    try {
-      described(wrong);
-      ADD_FAILURE() << wrong;
-    } catch (const SceneError& error) {
-      EXPECT_THAT(error.what(),
-                  HasSubstr(R"(`/output/annotations` must be a list of "scale", "axes", "legend", "body", "hidden")"));
-    }
+    EXPECT_THAT(message([&] { described(wrong); }),
+                HasSubstr(R"(`/output/annotations` must be a list of "scale", "axes", "legend", "body", "hidden")"));
   }
+}
+
+// How bright scene-linear light is shown: the view and the exposure that are chosen where the scene names none.
+
+Scene scene_of(const std::string& method, const Json& output) {
+  const Json json{{"field", {{"generate", {{"kind", "helix"}, {"resolution", 5}}}, {"scale", 0.6}}},
+                  {"integrator", {{"type", method}}},
+                  {"output", output}};
+  return load_scene(read_scene_json(json, "scene.json"), Progress());
+}
+
+/// Pixels of these values, a hundred of each.
+Render light_of(const std::vector<float>& values) {
+  Render render;
+  render.linear = Image(100, static_cast<int>(values.size()), {"R", "G", "B"});
+  for (std::size_t i = 0; i < render.linear.pixels.size(); ++i) render.linear.pixels[i] = values[i / 300];
+  return render;
+}
+
+double srgb(double linear) { return 1.055 * std::pow(linear, 1 / 2.4) - 0.055; }
+
+TEST(Exposure, UndisturbedLightIsLightGreyAndBrightLightIsBelowWhite) {
+  const Scene scene = scene_of("photon_distribution", Json::object());
+  const std::vector<float> light{0, 0.25f, 1, 2, 6};
+  const Image shown = display_image(scene, light_of(light), true);
+  for (std::size_t i = 1; i < light.size(); ++i)
+    EXPECT_NEAR(shown.pixels[300 * i], srgb(1 - std::exp(-light[i])), 1e-3) << light[i];
+}
+
+TEST(Exposure, IsChosenWhereLightIsDarkOrMuchIsBright) {
+  const Scene scene = scene_of("photon_distribution", Json::object());
+  EXPECT_EQ(display_exposure(scene, light_of({0, 0, 0})), 0);
+  EXPECT_EQ(display_exposure(scene, light_of({0, 0.5f, 1})), 0);
+  EXPECT_EQ(display_exposure(scene, light_of({1, 8})), 0);
+  EXPECT_NEAR(display_exposure(scene, light_of({0, 0.1f, 0.25f})), 2, 1e-12);
+  EXPECT_NEAR(display_exposure(scene, light_of({1, 32})), -2, 1e-12);
+}
+
+TEST(Exposure, OfOtherViewsHasTheBrightestHundredthBelowWhite) {
+  const Scene scene = scene_of("photon_distribution", {{"view", "Un-tone-mapped"}});
+  EXPECT_NEAR(display_exposure(scene, light_of({1, 3.6f})), -2, 1e-6);
+}
+
+TEST(Exposure, IsTheScenesIfItNamesOne) {
+  EXPECT_EQ(display_exposure(scene_of("photon_distribution", {{"exposure", -1.5}}), light_of({1, 32})), -1.5);
 }
 
 }  // namespace
