@@ -35,13 +35,12 @@ bool add_candidate(RTCPointQueryFunctionArguments* arguments) {
 
 /// Refuses triangles that are clearly met from outside.
 void take_outwards(const RTCFilterFunctionNArguments* all) {
-  constexpr float clear_slope = 0.1f;
   for (unsigned i = 0; i < all->N; ++i) {
-    const Eigen::Vector3f normal(RTCHitN_Ng_x(all->hit, all->N, i), RTCHitN_Ng_y(all->hit, all->N, i),
-                                 RTCHitN_Ng_z(all->hit, all->N, i));
-    const Eigen::Vector3f along(RTCRayN_dir_x(all->ray, all->N, i), RTCRayN_dir_y(all->ray, all->N, i),
-                                RTCRayN_dir_z(all->ray, all->N, i));
-    if (normal.dot(along) < -clear_slope * normal.norm()) all->valid[i] = 0;
+    if (all->valid[i] == 0) continue;
+    const RTCRay ray = rtcGetRayFromRayN(all->ray, all->N, i);
+    const RTCHit hit = rtcGetHitFromHitN(all->hit, all->N, i);
+    const Eigen::Vector3f normal(hit.Ng_x, hit.Ng_y, hit.Ng_z), along(ray.dir_x, ray.dir_y, ray.dir_z);
+    if (normal.dot(along) < -0.1f * normal.norm()) all->valid[i] = 0;
   }
 }
 
@@ -171,7 +170,6 @@ std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, c
 }
 
 std::uint32_t TriangleScene::met(const Segment* segments, int count, double margin, bool outwards) const {
-  constexpr float near = 8;  // In lengths of the segments: rays that start so near to each other are coherent.
   if (!state_->scene) return 0;
   alignas(64) RTCRay16 rays{};
   std::uint32_t valid = 0;
@@ -194,10 +192,9 @@ std::uint32_t TriangleScene::met(const Segment* segments, int count, double marg
     starts.extend(Eigen::Vector3f(ray.org_x, ray.org_y, ray.org_z));
     longest = std::max(longest, ray.tfar);
   }
-  const bool is_coherent = starts.diagonal().norm() < near * longest;
-  const auto filter = outwards ? take_outwards : nullptr;
-  const std::uint32_t others = ((1u << count) - 1) & ~valid;
-  return others | (valid == 0 ? 0 : embree::occluded(state_->scene.get(), rays, valid, filter, is_coherent));
+  return (((1u << count) - 1) & ~valid) |
+         embree::occluded(state_->scene.get(), rays, valid, outwards ? take_outwards : nullptr,
+                          starts.diagonal().norm() < 8 * longest);
 }
 
 void TriangleScene::crossings(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,

@@ -34,7 +34,6 @@ std::vector<const TriangleMesh*> meshes(const std::vector<Part>& parts) {
 
 /// The triangles of all parts, each larger by `margin` on all sides.
 TriangleMesh grown(const std::vector<Part>& parts, double margin) {
-  constexpr double most = 1e3;  // Of what has no area.
   TriangleMesh result;
   for (const Part& part : parts)
     for (const auto& [i, j, k] : part.mesh->triangles) {
@@ -42,7 +41,7 @@ TriangleMesh grown(const std::vector<Part>& parts, double margin) {
       const Eigen::Vector3d middle = (at[i] + at[j] + at[k]) / 3;
       const double longest = std::max({(at[j] - at[i]).norm(), (at[k] - at[j]).norm(), (at[i] - at[k]).norm()});
       const double to_edge = (at[j] - at[i]).cross(at[k] - at[i]).norm() / longest / 3;
-      const double factor = 1 + (margin < most * to_edge ? margin / to_edge : most);
+      const double factor = 1 + (margin < 1e3 * to_edge ? margin / to_edge : 1e3);
       const auto first = static_cast<std::uint32_t>(result.vertices.size());
       for (const std::uint32_t corner : {i, j, k}) result.vertices.push_back(middle + factor * (at[corner] - middle));
       result.triangles.push_back({first, first + 1, first + 2});
@@ -73,12 +72,9 @@ struct Geometry::State {
         volume(surfaces.bounds.bounds()),
         size(volume.diagonal().norm()),
         margin(relative_margin * size),
+        bounds({{&surfaces.bounds, Surface::bounds}}, volume.center(), size),
         cut(cut_parts(), volume.center(), size),
         absorbers(absorber_parts(), volume.center(), size) {
-    for (const auto& [a, b, c] : surfaces.bounds.triangles) {
-      const auto& at = surfaces.bounds.vertices;
-      planes.emplace_back((at[b] - at[a]).cross(at[c] - at[a]).normalized(), at[a]);
-    }
     cut_is_plain = find_whether_plain();
   }
 
@@ -87,23 +83,22 @@ struct Geometry::State {
   Eigen::AlignedBox3d volume;
   double size, margin;
   // The scenes' coordinates are relative to the volume, so that single precision resolves it well.
-  Group cut, absorbers;
-  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> planes;  // Of the bounds: normal and point.
+  Group bounds, cut, absorbers;
   bool cut_is_plain = false;  // Whether all of the cut separates inside from outside.
 
   /// Whether light that crosses the cut here crosses it in and out in turn, at places in no doubt.
   bool alternate(const Crossings& all) const {
     for (std::size_t i = 0; i < all.size(); ++i) {
-      if (!all[i].is_clear) return false;
-      if (i == 0) continue;
-      if (all[i].sign == all[i - 1].sign || all[i].distance - all[i - 1].distance <= margin) return false;
+      const double apart =
+          i == 0 ? infinite : (all[i].distance - all[i - 1].distance) * (all[i].sign != all[i - 1].sign);
+      if (!all[i].is_clear || apart <= margin) return false;
     }
     return true;
   }
 
   /// By lines through the triangles, or through many of them.
   bool find_whether_plain() const {
-    if (!surfaces.cut || surfaces.cut->triangles.empty()) return false;
+    if (!surfaces.cut) return false;
     const TriangleMesh& mesh = *surfaces.cut;
     const double far = 1.1 * cut.boxes[0].diagonal().norm();
     Crossings all;
@@ -114,8 +109,8 @@ struct Geometry::State {
     for (std::size_t i = 0; i < mesh.triangles.size(); i += 1 + mesh.triangles.size() / (1 << 16)) {
       const auto& [a, b, c] = mesh.triangles[i];
       const Eigen::Vector3d middle = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3;
-      const auto& along = Geometry::generic_directions;
-      if (std::none_of(along.begin(), along.end(), [&](const auto& direction) { return is_plain(middle, direction); }))
+      if (std::none_of(generic_directions.begin(), generic_directions.end(),
+                       [&](const auto& direction) { return is_plain(middle, direction); }))
         return false;
     }
     return true;
@@ -142,6 +137,14 @@ struct Geometry::State {
     for (std::size_t i = 0; i < surfaces.obstacles.size(); ++i)
       parts.push_back(part_of(surfaces.obstacles[i], Surface::obstacle, "obstacle " + std::to_string(i)));
     return parts;
+  }
+
+  /// The nearest hit of a group at more than `min_distance` (which may be negative).
+  std::optional<Hit> nearest(const Group& group, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                             double min_distance, double max_distance) const {
+    const auto seen = group.scene.nearest(from, direction, min_distance, max_distance);
+    if (!seen) return std::nullopt;
+    return exact(group, from, direction, *seen);
   }
 
   /// The hit of a triangle, its distance in double precision. @param seen  What the group's scene has found.
@@ -209,23 +212,18 @@ struct Geometry::State {
     return is_known;
   }
 
-  /// `Geometry::crossing` of the bounds, by their planes.
-  std::optional<Hit> bounds_crossing(bool inwards, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
-                                     double max_distance) const {
+  /// Where light leaves the bounds, by the planes of their triangles.
+  std::optional<Hit> exit_of_bounds(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                                    double max_distance) const {
     constexpr double min_slope = 1e-12;
-    Hit entry{-infinite, Surface::bounds}, exit{infinite, Surface::bounds};
-    for (const auto& [normal, point] : planes) {
-      const double slope = normal.dot(direction), gap = normal.dot(point - from), distance = gap / slope;
-      if (slope < -min_slope && distance > entry.distance) entry = {distance, Surface::bounds, normal};
-      if (slope > min_slope && distance < exit.distance) exit = {distance, Surface::bounds, normal};
-      if (std::abs(slope) <= min_slope && gap < -margin) return std::nullopt;
+    Hit exit{infinite, Surface::bounds, Eigen::Vector3d::Zero()};
+    for (std::uint32_t i = 0; i < surfaces.bounds.triangles.size(); ++i) {
+      const Hit hit = exact(bounds, from, direction, TriangleHit{infinite, 0, i});
+      if (hit.normal.dot(direction) > min_slope && hit.distance < exit.distance) exit = hit;
     }
-    if (entry.distance > exit.distance + (inwards ? 0 : margin)) return std::nullopt;
-    Hit hit = inwards ? entry : exit;
-    if (!(hit.distance >= -margin && hit.distance <= max_distance)) return std::nullopt;
-    if (!(hit.distance + margin > hit.distance)) return std::nullopt;  // Double precision does not resolve the margin.
-    hit.distance = std::max(hit.distance, 0.0);
-    return hit;
+    exit.distance = std::max(exit.distance, 0.0);
+    if (!(exit.distance <= max_distance)) return std::nullopt;
+    return exit;
   }
 
   /// `Geometry::crossing` of the cut.
@@ -238,47 +236,38 @@ struct Geometry::State {
     };
     const auto met = std::find_if(all.begin(), all.end(), may_count);
     if (met == all.end()) return std::nullopt;
-    if (cut_is_plain && alternate(all)) return hit_of(from, direction, *met);
+    const auto hit_of = [&](const TriangleCrossing& crossing) {
+      Hit hit = exact(cut, from, direction, crossing);
+      hit.distance = std::max(hit.distance, 0.0);
+      return hit;
+    };
+    if (cut_is_plain && alternate(all)) return hit_of(*met);
     cross_cut(from, direction, -margin, infinite, all);
-    return first_that_separates(inwards, from, direction, all, max_distance);
-  }
-
-  Hit hit_of(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, const TriangleCrossing& crossing) const {
-    Hit hit = exact(cut, from, direction, crossing);
-    hit.distance = std::max(hit.distance, 0.0);
-    return hit;
-  }
-
-  /// @param all  All crossings of the light.
-  std::optional<Hit> first_that_separates(bool inwards, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
-                                          const Crossings& all, double max_distance) const {
     for (std::size_t first = 0, last = 0; first < all.size(); first = last) {
       for (last = first + 1; last < all.size() && all[last].distance - all[last - 1].distance <= margin;) ++last;
-      std::size_t i = first;
-      while (i < last && ((all[i].sign < 0) != inwards || all[i].distance > max_distance)) ++i;
-      if (i < last && is_inside_beyond(from, direction, all, first, last) == inwards)
-        return hit_of(from, direction, all[i]);
+      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(first);
+      const auto end = all.begin() + static_cast<std::ptrdiff_t>(last), found = std::find_if(begin, end, may_count);
+      if (found != end && is_inside_beyond(from, direction, all, first, last) == inwards) return hit_of(*found);
     }
     return std::nullopt;
   }
 
   /// `Geometry::cut_ahead`.
   CutAhead ahead(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const {
-    constexpr double min_slope = 1e-6;
     if (cut_is_plain) {
       const auto next = cut.scene.nearest(from, direction, margin, infinite);
       if (!next) return {};
       const Hit hit = exact(cut, from, direction, *next);
       const double slope = hit.normal.dot(direction);
-      if (next->is_clear && slope > min_slope) return {true, std::nullopt};
-      if (next->is_clear && slope < -min_slope) return {false, hit};
+      if (next->is_clear && slope > 1e-6) return {true, std::nullopt};
+      if (next->is_clear && slope < -1e-6) return {false, hit};
     }
     thread_local Crossings all;
     cross_cut(from, direction, -margin, infinite, all);
     std::size_t here = 0;
     while (here < all.size() && all[here].distance <= margin) ++here;
     if (is_inside_beyond(from, direction, all, 0, here)) return {true, std::nullopt};
-    return {false, first_that_separates(true, from, direction, all, infinite)};
+    return {false, cut_crossing(true, from, direction, infinite)};
   }
 };
 
@@ -297,13 +286,10 @@ const Surfaces& Geometry::surfaces() const { return state_->surfaces; }
 
 std::optional<Hit> Geometry::absorber(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                       double max_distance) const {
-  const double margin = state_->margin;
   if (max_distance < infinite && !may_absorb(origin, origin + max_distance * direction)) return std::nullopt;
-  const auto seen = state_->absorbers.scene.nearest(origin, direction, -margin, max_distance + margin);
-  if (!seen) return std::nullopt;
-  Hit hit = state_->exact(state_->absorbers, origin, direction, *seen);
-  if (hit.distance > max_distance) return std::nullopt;
-  hit.distance = std::max(hit.distance, 0.0);
+  auto hit = state_->nearest(state_->absorbers, origin, direction, -state_->margin, max_distance + state_->margin);
+  if (!hit || hit->distance > max_distance) return std::nullopt;
+  hit->distance = std::max(hit->distance, 0.0);
   return hit;
 }
 
@@ -318,11 +304,10 @@ bool Geometry::may_absorb(const Eigen::Vector3d& from, const Eigen::Vector3d& to
 
 std::uint32_t Geometry::may_meet(const Segment* ways, int count) const {
   const double margin = 2 * state_->margin;
-  std::uint32_t met = state_->cut.grown_scene.met(ways, count, margin, true), near_absorbers = 0;
-  for (int i = 0; i < count; ++i) near_absorbers |= may_absorb(ways[i].from, ways[i].to) ? 1u << i : 0;
-  if ((near_absorbers & ~met) != 0)
-    met |= near_absorbers & state_->absorbers.grown_scene.met(ways, count, margin, false);
-  return met;
+  std::uint32_t near = 0;
+  for (int i = 0; i < count; ++i) near |= may_absorb(ways[i].from, ways[i].to) ? 1u << i : 0;
+  if (near != 0) near &= state_->absorbers.grown_scene.met(ways, count, margin, false);
+  return near | state_->cut.grown_scene.met(ways, count, margin, true);
 }
 
 Eigen::AlignedBox3d Geometry::absorbers_within(const Eigen::AlignedBox3d& region) const {
@@ -337,7 +322,22 @@ Eigen::AlignedBox3d Geometry::absorbers_within(const Eigen::AlignedBox3d& region
 std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double max_distance) const {
   if (surface == Surface::cut) return state_->cut_crossing(inwards, origin, direction, max_distance);
-  return state_->bounds_crossing(inwards, origin, direction, max_distance);
+  // A line crosses a convex mesh once in each sense, where two triangles may meet. Along a face, rounding may show it
+  // the face again and again.
+  constexpr int max_crossings = 8;
+  double from = -state_->margin;
+  for (int i = 0; i < max_crossings; ++i) {
+    auto hit = state_->nearest(state_->bounds, origin, direction, from, max_distance + state_->margin);
+    if (!hit || hit->distance > max_distance) return std::nullopt;
+    if ((hit->normal.dot(direction) < 0) == inwards) {
+      hit->distance = std::max(hit->distance, 0.0);
+      return hit;
+    }
+    const double next = std::max(hit->distance, from) + state_->margin;
+    if (!(next > from)) return std::nullopt;  // Double precision does not resolve the margin at this distance.
+    from = next;
+  }
+  return inwards ? std::nullopt : state_->exit_of_bounds(origin, direction, max_distance);
 }
 
 CutAhead Geometry::cut_ahead(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const {

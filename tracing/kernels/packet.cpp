@@ -113,13 +113,11 @@ void for_chords(const PacketMedium& medium, const LaneStep& step, int count, con
 }  // namespace
 
 std::uint32_t near_surfaces(const PacketMedium& medium, const Packet& packet, std::uint32_t which) {
-  constexpr int most = 16;
-  const Geometry& geometry = *medium.settings.geometry;
-  Segment chords[most];
-  std::uint32_t lanes[most], near = 0;
+  Segment chords[16];
+  std::uint32_t lanes[16], near = 0;
   int count = 0;
   const auto test = [&] {
-    const std::uint32_t met = count > 0 ? geometry.may_meet(chords, count) : 0;
+    const std::uint32_t met = count > 0 ? medium.settings.geometry->may_meet(chords, count) : 0;
     for (int i = 0; i < count; ++i)
       if (met >> i & 1) near |= lanes[i];
     count = 0;
@@ -131,7 +129,7 @@ std::uint32_t near_surfaces(const PacketMedium& medium, const Packet& packet, st
     for_chords(medium, step, chords_of(step.voxels(), step.turn), [&](int, const Segment& chord) {
       lanes[count] = 1u << lane;
       chords[count++] = chord;
-      if (count == most) test();
+      if (count == 16) test();
       return false;
     });
   }

@@ -103,13 +103,14 @@ class Tracer {
     ++steps_;
     Hit onwards;
     onwards.distance = std::ldexp(geometry_.margin() * (1 + steps_ / 8.0), grazes_);
-    if (way <= onwards.distance) {
+    const bool grazes = way <= onwards.distance;
+    if (grazes) {
       ++grazes_;
       if (const auto end = reach(onwards)) return end;
     }
-    const CutAhead ahead = geometry_.cut_ahead(position(), direction());
-    const bool is_inside = ahead.is_inside && field_.contains(position());
-    const auto end = is_inside ? std::nullopt : cross_box(ahead.entry);
+    const bool is_inside = grazes && field_.contains(position()) && geometry_.inside_cut(position(), direction());
+    const auto entry = is_inside ? std::nullopt : geometry_.crossing(Surface::cut, true, position(), direction());
+    const auto end = is_inside ? std::nullopt : cross_box(entry);
     if (!end) ++steps_;
     return end;
   }

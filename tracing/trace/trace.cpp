@@ -2,10 +2,12 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <string_view>
 
 #include <Eigen/Geometry>
 
 #include "base/geometry/box.h"
+#include "base/text/content_hash.h"
 #include "tracing/kernels/packet_kernel.h"
 #include "tracing/steps/scalar_tracer.h"
 
@@ -145,36 +147,59 @@ void add_ray(const TensorField& field, const Tracer<N>& tracer, KernelRay ray, d
   traced.travelled.push_back(travelled);
 }
 
-/// Moves the rays of the batch to the points where they begin to bend; rays of one origin are moved together. Sets the
-/// end of rays that do not reach the field.
+/// The same for a ray that is where another one of the kernel is.
+void add_copy(std::size_t place, double strength, std::size_t number, TracedBatch& traced) {
+  packets::KernelRays& kernel = traced.kernel;
+  kernel.rays.push_back(kernel.rays[place]);
+  kernel.rays.back().strength = static_cast<float>(strength);
+  if (!kernel.differentials.empty()) kernel.differentials.push_back(kernel.differentials[place]);
+  traced.numbers.push_back(number);
+  traced.travelled.push_back(traced.travelled[place]);
+}
+
+/// For each ray, the first one that starts as it does.
+std::vector<std::size_t> first_rays(const RayBatch& batch) {
+  constexpr std::size_t none = ~std::size_t{0};
+  std::vector<std::size_t> firsts(batch.size()), table(2 * batch.size() + 1, none);
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const auto bytes = [](const auto& v) { return std::string_view(reinterpret_cast<const char*>(&v), sizeof v); };
+    std::uint64_t hash = content_hash(bytes(batch.position[i]), content_hash(bytes(batch.direction[i])));
+    while (table[hash % table.size()] != none && !same_start(batch, table[hash % table.size()], i)) ++hash;
+    std::size_t& first = table[hash % table.size()];
+    if (first == none) first = i;
+    firsts[i] = first;
+  }
+  return firsts;
+}
+
+/// Moves the rays of the batch to the points where they begin to bend, those of one origin together. Sets the end of
+/// rays that do not reach the field.
 template <int N>
 void approach(const TensorField& field, const BendingSettings& settings, RayBatch& batch, RayRecord* records,
               Tracer<N>& tracer, TracedBatch& traced) {
-  for (std::size_t i = 0; i < batch.size();) {
-    const std::size_t first = i;
-    const auto end = tracer.approach(start_of<N>(batch, first), before(records, first));
-    KernelRay ray = end ? KernelRay() : kernel_ray(field, tracer);
-    bool sampled = false;
-    std::size_t last = first + 1;
-    for (; last < batch.size() && same_start(batch, last, first); ++last)
-      if (records) records[last].before = records[first].before;
-    const auto state = tracer.state();
-    const Travelled travelled = tracer.travelled();
-    for (; i < last; ++i) {
-      const double strength = strength_of(batch, i, settings);
-      if (end || !std::isfinite(strength)) {
-        set_end(batch, i, std::isfinite(strength) ? *end : RayEnd::degenerate, tracer);
-        continue;
-      }
-      if (!sampled && may_be_strong(field, ray, strength)) {
-        ray.norm = static_cast<float>(tracer.deviator_here());
-        sampled = true;
-      }
-      add_ray(field, tracer, ray, strength, i, traced);
-      if (!records) continue;
-      tracer.take_over(state, strength, travelled, before(records, i));
-      tracer.record(true);
+  constexpr std::size_t none = ~std::size_t{0};
+  double strongest = 0;
+  for (std::size_t i = 0; i < batch.size(); ++i)
+    strongest = std::max(strongest, std::abs(strength_of(batch, i, settings)));
+  const std::vector<std::size_t> firsts = first_rays(batch);
+  std::vector<std::size_t> places(batch.size(), none);  // Of each ray in the kernel.
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const double strength = strength_of(batch, i, settings);
+    if (const std::size_t place = places[firsts[i]]; place != none && std::isfinite(strength)) {
+      if (records) records[i].before = records[firsts[i]].before;
+      add_copy(place, strength, i, traced);
+      continue;
     }
+    const auto end = tracer.approach(start_of<N>(batch, i), before(records, i));
+    if (end || !std::isfinite(strength)) {
+      set_end(batch, i, std::isfinite(strength) ? *end : RayEnd::degenerate, tracer);
+      continue;
+    }
+    KernelRay ray = kernel_ray(field, tracer);
+    if (may_be_strong(field, ray, strongest)) ray.norm = static_cast<float>(tracer.deviator_here());
+    tracer.record(true);
+    places[i] = traced.numbers.size();
+    add_ray(field, tracer, ray, strength, i, traced);
   }
 }
 
