@@ -149,8 +149,8 @@ inline std::uint32_t occluded(RTCScene scene, RTCRay16& rays, std::uint32_t whic
   rtcInitRayQueryContext(&context);
   RTCOccludedArguments arguments;
   rtcInitOccludedArguments(&arguments);
-  arguments.flags = static_cast<RTCRayQueryFlags>(RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER |
-                                                  (is_coherent ? RTC_RAY_QUERY_FLAG_COHERENT : 0));
+  const auto order = is_coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+  arguments.flags = static_cast<RTCRayQueryFlags>(RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER | order);
   arguments.context = &context;
   arguments.filter = filter;
   rtcOccluded16(valid, scene, &rays, &arguments);
