@@ -76,14 +76,15 @@ struct alignas(64) RayState {
 /// Positions are in voxels of level 0, from the first voxel of a brick of level 0, whatever the leaf is in which a ray
 /// was sampled last.
 struct alignas(64) Packet {
-  RayState now, next;         // Before and after the step that is being taken.
-  PerRay kick;                // σ.
-  PerRay length;              // Length of the path since the ray entered the packet, world units.
-  PerRay wanted;              // The next step, voxels of level 0, before it is limited by the leaf.
-  PerRay reach;               // Upper bound of ‖σ h T‖ in the leaf.
-  PerRay strongest;           // TensorBrick::strongest of the leaf.
-  PerRay low[3], high[3];     // Box of the voxels, relative to the brick.
-  PerRay last[3];             // Last cell, relative to the brick.
+  RayState now, next;      // Before and after the step that is being taken.
+  PerRay kick;             // σ.
+  PerRay length;           // Length of the path since the ray entered the packet, world units.
+  PerRay wanted;           // The next step, voxels of level 0, before it is limited by the leaf.
+  PerRay reach;            // Upper bound of ‖σ h T‖ in the leaf.
+  PerRay strongest;        // TensorBrick::strongest of the leaf.
+  PerRay low[3], high[3];  // Box of the voxels, relative to the brick.
+  PerRay last[3];          // Last cell, relative to the brick.
+  PerRay leaf_low[3], leaf_high[3], leaf_last[3];  // The same as seen from the leaf; only if the field has levels.
   PerRay log_radiance_scale;  // Λ since the ray entered the packet; not of rays with differentials.
   PerRay first[3], scale;     // LeafBrick::first and scale.
 

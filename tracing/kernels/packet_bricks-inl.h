@@ -9,10 +9,21 @@ HWY_INLINE LeafBrick leaf_of(const PacketMedium& medium, const Packet& packet, i
   return medium.leaf(at, {packet.first[0][lane], packet.first[1][lane], packet.first[2][lane]});
 }
 
-/// Sets the places of a vector's leaves to those of whole bricks of level 0.
-HWY_INLINE void set_places(Packet& packet, int at) {
-  store(zeros(), packet.first, at);
-  store(set(1), packet.scale, at);
+/// Whether a leaf holds the points `first` of all lanes of a vector.
+HWY_INLINE bool holds_all(const Packet& packet, const LeafBrick& leaf, int at) {
+  Mask all = hn::Eq(set(0), set(0));
+  for (int axis = 0; axis < 3; ++axis) {
+    const float low = leaf.first[static_cast<std::size_t>(axis)], high = low + TensorBrick::cells / leaf.scale;
+    const F point = load(packet.first[axis], at);
+    all = hn::And(all, hn::And(hn::Ge(point, set(low)), hn::Lt(point, set(high))));
+  }
+  return hn::AllTrue(floats, all);
+}
+
+/// Sets the places of a vector's leaves.
+HWY_INLINE void set_places(Packet& packet, const LeafBrick& leaf, int at) {
+  store({set(leaf.first[0]), set(leaf.first[1]), set(leaf.first[2])}, packet.first, at);
+  store(set(leaf.scale), packet.scale, at);
 }
 
 /// Finds the leaves of some lanes, at the points `first`. `wanted` has one bit for each lane; other lanes of their
@@ -26,10 +37,10 @@ HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uin
     };
     if (hn::AllTrue(ints, hn::And(same(0), hn::And(same(1), same(2))))) {
       const LeafBrick leaf = leaf_of(medium, packet, i);
-      if (leaf.scale == 1) {
+      if (leaf.scale == 1 || holds_all(packet, leaf, i)) {
         std::fill_n(packet.bending + i, lanes, leaf.brick.bending);
         store(set(leaf.brick.strongest), packet.strongest, i);
-        if (medium.levels) set_places(packet, i);
+        if (medium.levels) set_places(packet, leaf, i);
         continue;
       }
     }
@@ -67,9 +78,27 @@ HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
   packet.max_reach = hn::GetLane(hn::MaxOfLanes(floats, greatest));
 }
 
+/// A point as seen from the lanes' leaves, in their voxels.
+HWY_INLINE F3 in_leaf(const Packet& packet, const F3& point, int at) {
+  const F scale = load(packet.scale, at);
+  const F3 from = sub(point, load(packet.first, at));
+  return {hn::Mul(scale, from.x), hn::Mul(scale, from.y), hn::Mul(scale, from.z)};
+}
+
+/// Finds the box of the voxels as seen from the lanes' leaves.
+HWY_INLINE void find_extent_of_leaves(Packet& packet, int at) {
+  const F3 low = in_leaf(packet, load(packet.low, at), at), high = in_leaf(packet, load(packet.high, at), at);
+  const F one = set(1);
+  store(low, packet.leaf_low, at);
+  store(high, packet.leaf_high, at);
+  store({hn::Max(hn::Sub(high.x, one), low.x), hn::Max(hn::Sub(high.y, one), low.y),
+         hn::Max(hn::Sub(high.z, one), low.z)},
+        packet.leaf_last, at);
+}
+
 /// Finds the box of the voxels, relative to the lanes' bricks.
 HWY_INLINE void find_extent(const PacketMedium& medium, Packet& packet) {
-  for (int i = 0; i < packet.vectors * lanes; i += lanes)
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto base = hn::Mul(hn::Load(ints, packet.brick[axis] + i), hn::Set(ints, TensorBrick::cells));
       const F low = hn::ConvertTo(floats, hn::Sub(hn::Set(ints, medium.first[axis]), base));
@@ -78,6 +107,8 @@ HWY_INLINE void find_extent(const PacketMedium& medium, Packet& packet) {
       store(high, packet.high[axis], i);
       store(hn::Max(hn::Sub(high, set(1)), low), packet.last[axis], i);
     }
+    if (packet.refined) find_extent_of_leaves(packet, i);
+  }
 }
 
 /// Sets the values that depend on the lanes' bricks.
@@ -129,20 +160,6 @@ HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, std::
   summarize(medium, packet);
 }
 
-/// A point as seen from the lanes' leaves, in their voxels.
-HWY_INLINE F3 in_leaf(const Packet& packet, const F3& point, int at) {
-  const F scale = load(packet.scale, at);
-  const F3 from = sub(point, load(packet.first, at));
-  return {hn::Mul(scale, from.x), hn::Mul(scale, from.y), hn::Mul(scale, from.z)};
-}
-
-/// The first and the last cell of the extent, as seen from the lanes' leaves.
-HWY_INLINE void find_cells_of_extent(const Packet& packet, int at, F3& first, F3& last) {
-  first = in_leaf(packet, load(packet.low, at), at);
-  const F3 high = sub(in_leaf(packet, load(packet.high, at), at), {set(1), set(1), set(1)});
-  last = {hn::Max(high.x, first.x), hn::Max(high.y, first.y), hn::Max(high.z, first.z)};
-}
-
 /// Finds the sample points (`point_of(i)` gives those of the vector at lane i) and their cells. Points outside the
 /// extent are moved to it: the tensor there is that of the nearest point.
 /// @param moved  Bits of lanes; only their vectors are found again, and points outside their leaves count as on the
@@ -156,13 +173,14 @@ HWY_INLINE std::uint32_t find_cells(Packet& packet, std::uint32_t moved, const P
     if (moved != 0 && bits_of_vector(moved, i) == 0) continue;
     F3 point = point_of(i);
     store(point, packet.sample, i);
-    point = clamp(point, load(packet.low, i), load(packet.high, i));
-    F3 first_cell = load(packet.low, i), last_cell = load(packet.last, i);
-    if (HWY_UNLIKELY(packet.refined)) {
-      point = in_leaf(packet, point, i);
-      find_cells_of_extent(packet, i, first_cell, last_cell);
+    F3 near;
+    if (HWY_LIKELY(!packet.refined)) {
+      point = clamp(point, load(packet.low, i), load(packet.high, i));
+      near = clamp(floor(point), load(packet.low, i), load(packet.last, i));
+    } else {
+      point = clamp(in_leaf(packet, point, i), load(packet.leaf_low, i), load(packet.leaf_high, i));
+      near = clamp(floor(point), load(packet.leaf_low, i), load(packet.leaf_last, i));
     }
-    F3 near = clamp(floor(point), first_cell, last_cell);
     // As unsigned integers, negative floats are the greatest.
     const auto greatest =
         hn::Max(hn::BitCast(bits, near.x), hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
