@@ -148,18 +148,6 @@ void intersect(VoxelMask& mask, const VoxelMask& other) {
   for (std::size_t row = 0; row < mask.size(); ++row) mask[row] = static_cast<std::uint8_t>(mask[row] & other[row]);
 }
 
-/// The places of a refined brick within the extent, and those behind it where the extent has its last voxels.
-void add_places(const Vector3i& brick, const AlignedBox3i& extent, std::vector<Vector3i>& places) {
-  const AlignedBox3i within(place_of(extent.min()), place_of(extent.max()));
-  for (int n = 0; n < 27; ++n) {
-    const Vector3i offset(n / 9, n / 3 % 3, n % 3), place = 2 * brick + offset;
-    bool is_last = true;
-    for (int axis = 0; axis < 3; ++axis)
-      is_last = is_last && (offset[axis] < 2 || TensorBlock::size * place[axis] == extent.max()[axis]);
-    if (is_last && within.contains(place)) places.push_back(place);
-  }
-}
-
 }  // namespace
 
 AlignedBox3i finer_extent(const AlignedBox3i& extent) { return {2 * extent.min(), 2 * extent.max()}; }
@@ -181,8 +169,7 @@ CoefficientBricks finer_bricks(const BlockTable& table, const std::vector<Vector
                                const AlignedBox3i& extent, const Interpolant& interpolant) {
   const BrickIndex index(refined);
   std::vector<Vector3i> candidates;
-  for (const Vector3i& brick : refined) add_places(brick, extent, candidates);
-  sort_places(candidates);
+  for (const BlockShape& shape : shapes_within(refined, extent)) candidates.push_back(shape.origin / TensorBlock::size);
   const auto is_brick = [&](const Vector3i& place) { return index.find(parent_of(place)) != BrickIndex::missing; };
   CoefficientBricks result;
   result.places = candidates;

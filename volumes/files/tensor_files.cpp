@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <unordered_map>
 
+#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
@@ -110,32 +111,25 @@ TensorBlocks derived_blocks(const std::filesystem::path& path, const std::vector
                                    : gradient(samples, to_index);
 }
 
-std::string described_level(std::size_t level) { return "level " + std::to_string(level) + " of the field"; }
-
-/// Checks where the voxels of a level are. @param source  With the levels before.
+/// Checks that the blocks of a level are where there is the level before. @param source  With the levels before.
 void check_level(const std::filesystem::path& path, const BlockSource& source, const std::vector<BlockShape>& shapes) {
-  constexpr int margin = 4;  // A body may reach two voxels of level 0 beyond the extent.
   const std::size_t level = source.finer.size() + 1;
-  if (shapes.empty()) fail(path, described_level(level) + " has no active voxel");
-  const int scale = 1 << level;
-  const auto cell_of = [&](const Eigen::Vector3i& index) { return index.cast<double>() / scale; };
-  const Eigen::AlignedBox3i extent = active_box(source.shapes), box = active_box(shapes);
-  const Eigen::Vector3d beyond =
-      (extent.min().cast<double>() - cell_of(box.min())).cwiseMax(cell_of(box.max()) - extent.max().cast<double>());
-  if (beyond.maxCoeff() > margin / 2.0)
-    fail(path, described_level(level) + " reaches beyond the extent of level 0; level 0 must be complete");
-  if (level == 1) return;
-  const auto refined_of = [](const BlockShape& shape, int levels) {
-    const Eigen::Vector3i brick = (shape.origin / TensorBlock::size).unaryExpr([&](int i) { return i >> levels; });
-    return std::array<int, 3>{brick.x(), brick.y(), brick.z()};
+  const std::string name = "level " + std::to_string(level) + " of the field";
+  if (shapes.empty()) fail(path, name + " has no active voxel");
+  const auto place_of = [](const Eigen::Vector3i& voxel, int doublings) {
+    const Eigen::Vector3i place = voxel.unaryExpr([&](int i) { return i >> (3 + doublings); });
+    return std::array<int, 3>{place.x(), place.y(), place.z()};
   };
+  const Eigen::AlignedBox3i voxels = active_box(source.shapes);  // A body may reach beyond, but not by a block.
+  const Eigen::AlignedBox3i around(voxels.min().array() - TensorBlock::size, voxels.max().array() + TensorBlock::size);
   std::set<std::array<int, 3>> refined;
-  for (const BlockShape& shape : source.finer.back().shapes) refined.insert(refined_of(shape, 1));
+  for (std::size_t i = 0; level > 1 && i < source.finer.back().shapes.size(); ++i)
+    refined.insert(place_of(source.finer.back().shapes[i].origin, 1));
   for (const BlockShape& shape : shapes)
-    if (refined.count(refined_of(shape, 2)) == 0)
-      fail(path, described_level(level) + " has voxels where there is no level " + std::to_string(level - 1) +
-                     ", in the block at " + std::to_string(shape.origin.x()) + " " + std::to_string(shape.origin.y()) +
-                     " " + std::to_string(shape.origin.z()));
+    if (level == 1 ? !around.contains(Eigen::Vector3i(shape.origin / 2))
+                   : refined.count(place_of(shape.origin, 2)) == 0)
+      fail(path, fmt::format("{} has voxels where there is no level {}, in the block at {} {} {}", name, level - 1,
+                             shape.origin.x(), shape.origin.y(), shape.origin.z()));
 }
 
 /// Adds the finer levels of a field. @throw std::runtime_error if they do not fit to those before.
@@ -146,8 +140,8 @@ void add_levels(const std::filesystem::path& path, const VdbFile& file, const Fi
     const std::size_t level = source.finer.size() + 1;
     const Eigen::Affine3d right = to_world_of_level(source.to_world, static_cast<int>(level));
     if (!same_transform(right, common_transform(path, grids)))
-      fail(path, "grid " + parts.front().grid + " must have the transform of level 0 with voxels of 1/" +
-                     std::to_string(1 << level) + " of their size, and the same centre of voxel 0");
+      fail(path, fmt::format("grid {} must have the transform of level 0, with voxels of 1/{} of their size",
+                             parts.front().grid, 1 << level));
     const std::size_t bytes = derive != Derive::none ? sizeof(SampleBlock) : min_brick_bytes;
     std::vector<BlockShape> shapes = find_blocks(path, grids, bytes);
     check_level(path, source, shapes);

@@ -115,7 +115,7 @@ std::vector<Damage> damages() {
       {"no voxel", [](auto& grids) { add_rows(grids, 1, 0.5, [](auto&) {}); },
        "level 1 of the field has no active voxel"},
       {"beyond level 0", [](auto& grids) { add_rows(grids, 1, 0.5, [](auto& tree) { fill_from(tree, 64, 79); }); },
-       "reaches beyond the extent of level 0"},
+       "where there is no level 0"},
       {"beside level 1",
        [=](auto& grids) {
          add_rows(grids, 1, 0.5, half);
