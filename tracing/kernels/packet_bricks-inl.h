@@ -57,7 +57,8 @@ HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
       const F scale = load(packet.scale, i);
       packet.refined |= !hn::AllTrue(floats, hn::Eq(scale, set(1)));
       // Adaptive steps that reach into a finer leaf are repeated if they are too long for it.
-      if (medium.adaptive) reach = hn::Div(reach, scale);
+      const F shorter = hn::Max(set(1), hn::Mul(set(static_cast<float>(1 / step_lengths::longest_into_finer)), scale));
+      if (medium.adaptive) reach = hn::Div(reach, shorter);
     }
     store(reach, packet.reach, i);
     greatest = hn::Max(greatest, hn::IfThenElse(hn::Le(reach, most), reach, most));  // NaN counts as strong.

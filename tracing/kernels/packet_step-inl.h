@@ -397,7 +397,8 @@ HWY_NOINLINE std::uint32_t control_steps(const PacketMedium& medium, Packet& pac
     Mask fails = hn::Gt(excess, set(1));
     if (medium.levels) {
       longest = hn::Div(longest, load(packet.finest, i));
-      fails = hn::Or(fails, hn::Gt(wanted, hn::Mul(set(1.001f), longest)));
+      fails =
+          hn::Or(fails, hn::Gt(wanted, hn::Mul(set(static_cast<float>(step_lengths::longest_into_finer)), longest)));
     }
     store(hn::Min(hn::Mul(wanted, growth(excess)), longest), packet.wanted, i);
     const F3 v = load(packet.next.v, i);  // A lane without a direction does not stay: it stops, whatever its error.

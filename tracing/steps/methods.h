@@ -97,8 +97,9 @@ constexpr double shortest_splitting = 1.0 / 64;  ///< Of automatic steps; splitt
 constexpr double strongest_kick = 0.2;           ///< Limit of |σ| h ‖T − ⅓ tr(T) I‖ in an automatic step.
 constexpr double longest_adaptive = 2;           ///< So that no step passes over a voxel.
 constexpr double shortest_adaptive = 1e-6;
-constexpr double longest_composed = 6;       ///< Of automatic steps of `splitting4`: its samples are then 2.1 apart.
-constexpr double strongest_composed = 1.25;  ///< As strongest_kick, for its first step.
+constexpr double longest_composed = 6;        ///< Of automatic steps of `splitting4`: its samples are then 2.1 apart.
+constexpr double longest_into_finer = 2.001;  ///< As a part of the longest step of a finer leaf into which it leads.
+constexpr double strongest_composed = 1.25;   ///< As strongest_kick, for its first step.
 
 /// A step through a brick where nothing bends light ends this far beyond the brick. Otherwise rounding could keep the
 /// ray in it. The second value is for methods that also sample at the end of a step.

@@ -11,7 +11,6 @@
 #include "tracing/bending/bending.h"
 #include "tracing/bending/geometry.h"
 #include "tracing/steps/bending_steps.h"
-#include "volumes/bricks/brick_point.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
@@ -27,13 +26,6 @@ constexpr double composed_landing = 1e-3, other_landing = 1e-10;
 inline double deviator_norm(const Eigen::Matrix3d& T) {
   const double third = T.trace() / 3;
   return std::sqrt(std::max(0.0, T.squaredNorm() - 3 * third * third));
-}
-
-/// How many voxels of the leaf at a point are along an edge of a voxel of level 0.
-inline double leaf_scale(const TensorField& field, const Eigen::Vector3d& world) {
-  if (field.levels() == 1) return 1;
-  const BrickPoint at = brick_point(field, field.to_index() * world);
-  return double{field.leaf({at.brick[0], at.brick[1], at.brick[2]}, at.position).scale};
 }
 
 /// How far a ray has been traced.
@@ -358,21 +350,21 @@ class Tracer {
     return is_composed() ? longest_composed : settings_.step > 0 ? settings_.step : longest_adaptive;
   }
 
-  /// Finds the voxel of the leaf where the ray is. An adaptive step keeps its length from leaf to leaf, or is
+  /// Finds the voxel of the leaf that was sampled last. An adaptive step keeps its length from leaf to leaf, or is
   /// shortened.
   void find_voxel() {
-    const double scale = leaf_scale(field_, position());
+    const double scale = sampler_.scale();
     if (scale != scale_) adaptive_step_ = std::min(adaptive_step_ * scale / scale_, longest_step());
     scale_ = scale;
     voxel_ = length_of_voxel();
   }
 
-  /// Sets the next adaptive step from the error of this one, which leads to `next`.
+  /// Sets the next adaptive step from the error of this one.
   /// @return whether the step must be repeated, because of its error, or because it was too long for a finer leaf into
   /// which it led: samples might miss what is there.
-  bool control_step(const State<N>& next, const State<N>& error) {
+  bool control_step(const State<N>& error) {
     using namespace step_lengths;
-    const double finer = std::max(1.0, leaf_scale(field_, next.position()) / scale_);
+    const double finer = std::max(1.0, sampler_.scale() / scale_);
     const double excess =
         std::max(error.position().norm() / (scale_ * voxel_), error.direction().norm()) / settings_.tolerance;
     const double order = is_composed() ? composed_order : runge_kutta(settings_.method)->order;
@@ -380,7 +372,7 @@ class Tracer {
         (is_composed() ? composed_safety : safety) * std::pow(std::max(excess, min_excess), -1 / order);
     const double growth = factor > min_growth ? std::min(factor, max_growth) : min_growth;
     const double longest = longest_step() / finer;
-    const bool is_too_long = finer > 1 && adaptive_step_ > 1.001 * longest;
+    const bool is_too_long = finer > 1 && adaptive_step_ > longest_into_finer * longest;
     adaptive_step_ = std::clamp(adaptive_step_ * growth, shortest_adaptive, longest);
     return excess > 1 || is_too_long;
   }
@@ -400,8 +392,8 @@ class Tracer {
   /// Steps through the field to an absorber, out of the box or out of the cut. Returns nothing if the ray leaves the
   /// cut.
   std::optional<RayEnd> bend(double first_step, const State<N>* first_end) {
+    if (!(first_step > 0) || field_.levels() > 1) medium_.sample(ray_.P);  // For `automatic_step`, and the leaf.
     find_voxel();
-    if (!(first_step > 0)) medium_.sample(ray_.P);  // For `automatic_step`.
     adaptive_step_ = first_step > 0 ? first_step / voxel_ : settings_.step == 0 ? automatic_step() : settings_.step;
     record(true);
     while (true) {
@@ -418,7 +410,7 @@ class Tracer {
       if (event == Event::none) {
         next = step(h, error);
         if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
-        if (is_controlled_ && control_step(next, error) && wanted > step_lengths::shortest_adaptive * voxel_) continue;
+        if (is_controlled_ && control_step(error) && wanted > step_lengths::shortest_adaptive * voxel_) continue;
         event = meet(next, h, landing);
       }
       if (event == Event::none) {

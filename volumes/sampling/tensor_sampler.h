@@ -34,6 +34,9 @@ class TensorSampler {
 
   std::uint64_t samples() const { return samples_; }  ///< Calls of `at` so far.
 
+  /// LeafBrick::scale of the brick that was sampled last.
+  double scale() const { return scale_; }
+
  private:
   int locate(const Eigen::Vector3d& world, Eigen::Vector3d& fraction);
   void find_leaf(const Eigen::Vector3i& at, Eigen::Vector3i& cell, Eigen::Vector3d& fraction);

@@ -55,9 +55,10 @@ bool near_corner(const Vector3d& p) { return in_l(p) && (p.array() < 20).all(); 
 
 /// Waves of 24 to 64 voxels, and in finer levels of half and of a quarter of these lengths, too.
 Matrix3d waves(const Vector3d& p, int level) {
-  Matrix3d T = smooth_tensor(41)(p);
-  if (level > 0) T += 0.3 * smooth_tensor(42)(2 * p);
-  if (level > 1) T += 0.2 * smooth_tensor(43)(4 * p);
+  static const TensorFunction smooth[] = {smooth_tensor(41), smooth_tensor(42), smooth_tensor(43)};
+  Matrix3d T = smooth[0](p);
+  if (level > 0) T += 0.3 * smooth[1](2 * p);
+  if (level > 1) T += 0.2 * smooth[2](4 * p);
   return T / mean_edge;
 }
 
@@ -70,10 +71,9 @@ TensorGrid waves_grid(const AlignedBox3i& box, const Lattice& lattice, int level
 }
 
 AlignedBox3i usual_box() { return index_box({0, 0, 0}, {33, 33, 33}); }
+TensorField waves_field(const Lattice& lattice) { return cubic_field(waves_grid(usual_box(), lattice, 3)); }
 
-TensorField waves_field(const Lattice& lattice, int levels = 3) {
-  return cubic_field(waves_grid(usual_box(), lattice, levels));
-}
+std::vector<Lattice> two_lattices() { return {lattices().front(), lattices().back()}; }
 
 /// Light along axes, diagonals and faces of bricks of all levels, exactly and nearly; and at random.
 RayBatch rays_of_all_kinds(const TensorField& field, const std::vector<double>& flexibilities) {
@@ -81,12 +81,10 @@ RayBatch rays_of_all_kinds(const TensorField& field, const std::vector<double>& 
   const Vector3d ways[] = {{1, 0, 0}, {0, 1, 0},  {0, 0, -1},   {1, 1, 0},        {0, 1, -1},
                            {1, 1, 1}, {1, -1, 1}, {1, 1e-3, 0}, {1e-3, 1, -1e-3}, {3, 1, 2}};
   for (const Vector3d& way : ways)
-    for (const double at : {0.0, 2.0, 4.0, 8.0, 12.0, 16.0, 17.3, 24.0, 32.0})
-      for (const double beside : {-1e-4, 0.0, 1e-4}) {
-        const Vector3d through = Vector3d::Constant(std::min(std::max(at + beside, 0.0), 32.0));
-        add_bundle(rays, field, through + 60 * Vector3d(0, 0, beside) - 70 * way.normalized(), way, flexibilities);
-      }
-  const RayBatch others = random_rays(field, 40, flexibilities, 49);
+    for (const double at : {2.0, 4.0, 8.0, 16.0, 17.3})
+      for (const double beside : {0.0, 1e-4})
+        add_bundle(rays, field, Vector3d::Constant(at + beside) - 70 * way.normalized(), way, flexibilities);
+  const RayBatch others = random_rays(field, 24, flexibilities, 49);
   for (std::size_t i = 0; i < others.size(); ++i)
     rays.add(others.position[i], others.direction[i], others.flexibility[i]);
   return rays;
@@ -96,45 +94,39 @@ using RaysThroughLevels = EveryInstructionSet;
 INSTANTIATE_TEST_SUITE_P(All, RaysThroughLevels, test::instruction_sets(), instruction_set_name);
 
 TEST_P(RaysThroughLevels, PacketsAreTheReference) {
-  for (const Lattice& lattice : tested_lattices()) {
-    for (const double step : {0.25, 1.0, 4.0}) {
-      TensorField field = waves_field(lattice);
-      ASSERT_EQ(field.levels(), 3);
-      RayBatch rays = rays_of_all_kinds(field, wavelengths(0.02));
-      expect_reference(
-          make_scene(lattice.name + ", step " + std::to_string(step), std::move(field), {}, step, std::move(rays)),
-          0.2);
-    }
-    for (const double kick : {1e-3, 0.05, 1.0}) {
-      TensorField field = waves_field(lattice);
-      RayBatch rays = rays_of_all_kinds(field, wavelengths(kick));
-      Scene scene = make_scene(lattice.name + ", kick " + std::to_string(kick), std::move(field), {}, 0, rays);
-      if (kick > 0.1) scene.settings.max_length = 1;  // World units: 20 voxels.
+  for (const Lattice& lattice : two_lattices()) {
+    const TensorField field = waves_field(lattice);
+    ASSERT_EQ(field.levels(), 3);
+    const auto expect = [&](double step, double kick, double length) {
+      Scene scene = make_scene(lattice.name + ", step " + std::to_string(step) + ", kick " + std::to_string(kick),
+                               field, {}, step, rays_of_all_kinds(field, {0.5 * kick, -kick}));
+      scene.settings.max_length = length;
       expect_as_exact_as_reference(scene);
-    }
+    };
+    for (const double step : {1.0, 4.0}) expect(step, 0.02, Geometry::infinite);
+    for (const double kick : {1e-3, 0.05}) expect(0, kick, Geometry::infinite);
+    expect(0, 1, 20 * mean_edge);
   }
 }
 
 TEST_P(RaysThroughLevels, OneVoxelAlongAnAxisAndExtentsOfAnySize) {
-  for (const Lattice& lattice : tested_lattices())
-    for (const AlignedBox3i& box : {index_box({7, -1, 0}, {1, 30, 20}), index_box({0, 3, 8}, {30, 1, 1}), odd_box(),
-                                    index_box({-5, -3, -1}, {12, 11, 7})}) {
-      TensorGrid grid = waves_grid(box, lattice, 1);
-      refine(grid, in_l, [&](const Vector3d& p) { return waves(p, 1); });
-      TensorField field = cubic_field(grid);
-      RayBatch rays = random_rays(field, 40, wavelengths(0.05), 47);
+  for (const Lattice& lattice : two_lattices())
+    for (const AlignedBox3i& box :
+         {index_box({7, -1, 0}, {1, 30, 20}), index_box({0, 3, 8}, {30, 1, 1}), index_box({-5, -3, -1}, {28, 11, 7})}) {
+      TensorField field = cubic_field(waves_grid(box, lattice, 2));
+      RayBatch rays = random_rays(field, 24, {0.02, 0.05}, 47);
       expect_as_exact_as_reference(make_scene(lattice.name, std::move(field), {}, 0, std::move(rays)));
     }
 }
 
 TEST_P(RaysThroughLevels, SurfacesAndCutsWithinFineBricks) {
-  for (const Lattice& lattice : tested_lattices())
+  for (const Lattice& lattice : two_lattices())
     for (const bool with_cut : {false, true}) {
       Surfaces surfaces;
       if (with_cut) surfaces.cut = box_mesh({Vector3d(2.3, 3.1, 1.7), Vector3d(30.2, 22.9, 29)}, lattice.to_world);
       surfaces.obstacles.push_back(box_mesh({Vector3d(5.2, 6.3, 5.1), Vector3d(9.1, 9.9, 11.3)}, lattice.to_world));
       TensorField field = waves_field(lattice);
-      RayBatch rays = random_rays(field, 80, wavelengths(0.02), 51);
+      RayBatch rays = random_rays(field, 48, {0.01, 0.02}, 51);
       expect_as_exact_as_reference(
           make_scene(lattice.name + (with_cut ? ", cut" : ""), std::move(field), surfaces, 0, std::move(rays)));
     }
@@ -146,7 +138,7 @@ TEST_P(RaysThroughLevels, ARayDoesNotDependOnTheOthers) {
   const RayBatch rays = rays_of_all_kinds(field, {0.02, 0.05});
   const Scene scene = make_scene("alone", std::move(field), {}, 0, rays);
   const RayBatch together = traced(scene, rays);
-  for (std::size_t i = 0; i < rays.size(); i += 7) {
+  for (std::size_t i = 0; i < rays.size(); i += 5) {
     RayBatch one;
     one.add(rays.position[i], rays.direction[i], rays.flexibility[i]);
     one = traced(scene, one);
@@ -171,9 +163,8 @@ TEST_P(RaysThroughLevels, DifferentialsAreThoseOfTheReference) {
 
 /// Light reaches no end in fields that cannot be followed, but it stops.
 TEST_P(RaysThroughLevels, NothingHangs) {
-  const double bad[] = {std::nan(""), std::numeric_limits<double>::infinity(), 1e30};
-  for (const double value : bad) {
-    TensorGrid grid = waves_grid(usual_box(), lattices()[0], 2);
+  for (const double value : {std::nan(""), std::numeric_limits<double>::infinity(), 1e30}) {
+    TensorGrid grid = waves_grid(usual_box(), lattices()[0], 3);
     grid.finer[0][20].values[100](1, 2) = static_cast<float>(value);
     TensorField field = cubic_field(grid);
     RayBatch rays = rays_of_all_kinds(field, {0.05, 1e30, std::nan("")});
@@ -185,8 +176,6 @@ TEST_P(RaysThroughLevels, NothingHangs) {
     for (const std::uint32_t steps : ends.steps) EXPECT_LE(steps, 1001u);
   }
 }
-
-// Levels that add nothing.
 
 /// Level 0 alone, and refined with its own values.
 struct Redundant {
@@ -220,19 +209,36 @@ TEST(LevelsThatAddNothing, RaysAndDifferentialsAreThoseOfLevelZero) {
       scene.settings.method = method;
       scene.settings.tolerance = 1e-8;
       scene.settings.max_steps = 100000;
-      const RayBatch expected = traced_by_reference(scene, rays), fast = traced(scene, rays);
+      const RayBatch expected = traced_by_reference(scene, rays);
       scene.field = fields.refined;
-      const RayBatch exact = traced_by_reference(scene, rays), packets = traced(scene, rays);
+      const RayBatch exact = traced_by_reference(scene, rays);
       for (std::size_t i = 0; i < rays.size(); ++i) {
         ASSERT_EQ(exact.end[i], expected.end[i]);
         EXPECT_LT(distance_in_voxels(exact.position[i], expected.position[i]), 1e-6) << i << ", " << step;
-        // Each step of a packet rounds to 5e-7 of a voxel.
-        EXPECT_LT(distance_in_voxels(packets.position[i], fast.position[i]), 2e-5) << i << ", " << step;
         if (!with_differentials) continue;
         const double apart = (exact.differentials[i].position - expected.differentials[i].position).norm();
         EXPECT_LT(apart, 1e-5 * expected.differentials[i].position.norm()) << i;
       }
     }
+}
+
+/// Each step of a packet rounds to 5e-7 of a voxel, and turns the ray by 1e-7.
+TEST(LevelsThatAddNothing, PacketsAreThoseOfLevelZeroUpToRounding) {
+  const Redundant fields;
+  const RayBatch rays = random_rays(fields.alone, 60, wavelengths(0.02), 53);
+  for (const double tolerance : {1e-5, 1e-3}) {
+    Scene scene = make_scene("alone", fields.alone, {}, 0, rays);
+    scene.settings.tolerance = tolerance;
+    const RayBatch expected = traced(scene, rays);
+    scene.field = fields.refined;
+    const RayBatch packets = traced(scene, rays);
+    std::vector<double> apart;
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      apart.push_back(distance_in_voxels(packets.position[i], expected.position[i]));
+    std::sort(apart.begin(), apart.end());
+    EXPECT_LT(apart[apart.size() / 2], 5e-6 + 0.01 * tolerance);
+    EXPECT_LT(apart[apart.size() * 9 / 10], 5e-5 + 0.1 * tolerance);
+  }
 }
 
 /// Tubes are made of the tensors along paths.
@@ -262,8 +268,6 @@ TEST(LevelsThatAddNothing, PathsHaveTheSameTensors) {
       EXPECT_LT((a.change - b.change).norm(), 1e-4 * 0.02 * greatest);
     }
 }
-
-// Levels that follow a formula.
 
 /// Smooth, with a bump where the field is refined.
 Matrix3d bump(const Vector3d& p) {
@@ -338,8 +342,8 @@ TEST(LevelsOfAFormula, StepsFollowTheVoxels) {
     EXPECT_LT(distance_in_voxels(fast.position[i], expected.position[i]), 0.02) << i;
     EXPECT_LT(distance_in_voxels(exact.position[i], expected.position[i]), 0.02) << i;
   }
-  EXPECT_LT(2 * fast.tensor_samples, expected.tensor_samples);
-  EXPECT_LT(2 * exact.tensor_samples, expected.tensor_samples);
+  EXPECT_LT(1.5 * static_cast<double>(fast.tensor_samples), static_cast<double>(expected.tensor_samples));
+  EXPECT_LT(1.5 * static_cast<double>(exact.tensor_samples), static_cast<double>(expected.tensor_samples));
 }
 
 }  // namespace
