@@ -9,7 +9,6 @@
 #include "base/constants.h"
 #include "base/process/seconds.h"
 #include "integrators/polariscope/load_polariscope.h"
-#include "integrators/polariscope/polariscope_legend.h"
 #include "renderer/film/spectral_image.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/body_outline.h"
