@@ -1,12 +1,14 @@
 #pragma once
 /// @file integrators/polariscope/load_polariscope.h
-/// From the settings of a scene to the light that is traced.
+/// From the settings of a scene to the light that is traced; and what the picture's colours mean.
 
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "integrators/polariscope/polariscope.h"
 #include "integrators/polariscope/polariscope_method.h"
+#include "renderer/images/image.h"
 #include "scenes/scene/scene.h"
 
 namespace tensorray {
@@ -23,5 +25,13 @@ struct LoadedLightOfPolariscope {
 /// @param notes  Says what "auto" chose. @throw std::runtime_error naming the file of coefficients and the fix.
 LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeDescription& settings,
                                           std::vector<std::string>& notes);
+
+/// The interference colours of the scene's light, from 0 to a retardance (nm, at the reference wavelength) of a plate
+/// that is turned by 45° against the first polariser, and a cross of the polarisers' directions: P the first one, A the
+/// analyser. For Render::draw_legend. @param greatest  Finite, > 0.
+std::function<void(Image&, double exposure)> polariscope_legend(const Scene& scene,
+                                                                const LoadedLightOfPolariscope& loaded,
+                                                                const PolariscopeDescription& settings,
+                                                                double greatest);
 
 }  // namespace tensorray

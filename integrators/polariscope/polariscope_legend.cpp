@@ -1,10 +1,9 @@
-#include "integrators/polariscope/polariscope_legend.h"
-
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "base/constants.h"
+#include "integrators/polariscope/load_polariscope.h"
 #include "renderer/charts/color_bar.h"
 #include "renderer/charts/ink.h"
 #include "renderer/charts/lettering.h"

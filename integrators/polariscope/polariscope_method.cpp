@@ -9,7 +9,6 @@
 #include "base/constants.h"
 #include "base/process/seconds.h"
 #include "integrators/polariscope/load_polariscope.h"
-#include "integrators/polariscope/polariscope_legend.h"
 #include "renderer/film/spectral_image.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/body_outline.h"
@@ -176,7 +175,8 @@ Render LoadedPolariscope::render_of(const Scene& scene, const PolarPicture& pict
         "`integrator.stress_optic` and `integrator.unit_length`, or leave the first to \"auto\"");
   result.metadata = {{"tensorray:stress_optic", fmt::format("{:.17g}", loaded_.stress_optic)},
                      {"tensorray:wavelength", fmt::format("{:.17g}", loaded_.wavelength)}};
-  result.draw_legend = polariscope_legend(scene, loaded_, settings_, shown > 0 ? shown : loaded_.wavelength);
+  if (scene.description.output.wants(Annotation::legend))
+    result.draw_legend = polariscope_legend(scene, loaded_, settings_, shown > 0 ? shown : loaded_.wavelength);
   result.describe_pixel = [wavelength = loaded_.wavelength](const float* pixel) {
     return std::vector<std::pair<std::string, std::string>>{
         {"order", fmt::format("{:.3f} at {:.1f} nm", pixel[integral_channel] / wavelength, wavelength)},
