@@ -94,8 +94,8 @@ TEST(AutoDirection, IsTheOneThatShowsMost) {
 /// A plate in plane stress: light along its normal, which is a principal direction, goes straight, and light along its
 /// edges makes a strip.
 TEST(AutoDirection, OfAPlateIsADiagonalThatFillsThePicture) {
-  const TensorGrid grid = dense_grid({Eigen::Vector3i::Zero(), {40, 20, 2}}, Eigen::Affine3d(Eigen::Scaling(0.1)),
-                                     [](const Eigen::Vector3i& at) -> Matrix3d {
+  const TensorGrid grid = dense_grid(Eigen::AlignedBox3i(Eigen::Vector3i::Zero(), Eigen::Vector3i(40, 20, 2)),
+                                     Eigen::Affine3d(Eigen::Scaling(0.1)), [](const Eigen::Vector3i& at) -> Matrix3d {
                                        return std::sin(0.3 * at.x()) * Vector3d(1, 0.2, 0).asDiagonal().toDenseMatrix();
                                      });
   const TensorField field(grid, {Interpolation::cubic, Border::extend});
