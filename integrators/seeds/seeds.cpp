@@ -15,7 +15,7 @@
 #include "base/geometry/box.h"
 #include "base/text/text.h"
 #include "renderer/sampling/random.h"
-#include "volumes/bricks/brick_point.h"
+#include "volumes/sampling/brick_point.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {

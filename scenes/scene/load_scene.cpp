@@ -29,6 +29,8 @@ constexpr int least_resolution = 128;     // Pixels along its shorter side, if t
 constexpr int most_resolution = 2048;     // ... are not more than this.
 constexpr double narrowest_plate = 0.25;  // Its shorter side, as a part of the longer one, where the size is not given.
 constexpr double visible = 0.02;          // AutoScale::shown; a picture that shows less looks empty.
+constexpr double much_less = 0.5;         // Of the best AutoScale::shown: reason to name that scale.
+constexpr double much = 1;                // AutoScale::median_turn, radians.
 
 BlockSource open_field(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
@@ -242,9 +244,9 @@ Surfaces load_surfaces(const SceneDescription& description, const TensorField& f
 
 /// What to do about a given scale that shows hardly anything; empty: it shows enough, or no other one would.
 std::string advice_on(const AutoScale& given, const AutoScale& best) {
-  if (given.shown >= visible || best.shown <= 2 * given.shown) return "";
-  const bool is_tangled = std::abs(given.scale) > best.scale;
-  return fmt::format("warning: {}: `field.scale` {:.3g} shows {:.0f}% of the field, {:.3g} shows {:.1g}%",
+  const bool is_tangled = given.median_turn > best.median_turn;
+  if (given.shown >= much_less * best.shown) return "";
+  return fmt::format("warning: {}: `field.scale` {:.3g} shows {:.0f}% of the field, {:.3g} shows {:.2g}%",
                      is_tangled ? "light is tangled" : "light turns too little to be seen", best.scale,
                      100 * best.shown, given.scale, 100 * given.shown);
 }
@@ -271,7 +273,8 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
       "{:.0f}%)",
       scale.scale, scale.scale < 0 ? ", negative: light bends the other way," : "", given ? flexibility : 0.2,
       scale.median_turn, scale.greatest_turn, 100 * scale.shown));
-  if (given && scale.shown < visible && description.integrator.method().needs_light_direction(description)) {
+  if (given && (scale.shown < visible || scale.median_turn > much) &&
+      description.integrator.method().needs_light_direction(description)) {
     const std::string advice = advice_on(scale, choose_scale(field, volume, light, progress));
     if (!advice.empty()) notes.push_back(advice);
   }

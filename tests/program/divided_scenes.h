@@ -48,6 +48,6 @@ inline const std::string gaussian_photons =
 inline const std::string lens = R"({"type": "lens", "samples": 2, "mode": "gather"})";
 inline const std::string stretch = R"({"type": "stretch", "stretch": {"resolution": 24, "pixels": 96}})";
 
-inline const std::string polariscope = R"({"type": "polariscope", "arrangement": "plane"})";
+inline const std::string polariscope = R"({"type": "polariscope", "arrangement": "plane", "samples": 12})";
 
 }  // namespace tensorray::test

@@ -314,7 +314,8 @@ TEST_F(ReadScene, OutputsOfTheCommandLineTakeThePlaceOfTheScenes) {
 
 /// input_files lists every key that names a file, and an output is refused under any name of the same file.
 TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
-  for (const char* name : {"body.ply", "cut.ply", "photo.png", "sky.exr", "lamp.txt", "config.ocio", "seeds.txt"})
+  for (const char* name :
+       {"body.ply", "cut.ply", "photo.png", "sky.exr", "lamp.txt", "config.ocio", "seeds.txt", "optic.txt"})
     std::ofstream(folder_ / name) << name;
   fs::create_directories(folder_ / "folder");
   const Overrides inputs{"obstacles=[{\"file\":\"body.ply\"}]",
@@ -323,7 +324,8 @@ TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
                          "lights=[{\"kind\":\"environment\",\"file\":\"sky.exr\"}]",
                          "light.spectrum=lamp.txt",
                          "output.ocio=config.ocio",
-                         "integrator.seeds={\"kind\":\"file\",\"file\":\"seeds.txt\"}"};
+                         "integrator.seeds={\"kind\":\"file\",\"file\":\"seeds.txt\"}",
+                         "integrator.stress_optic=optic.txt"};
   unsetenv("OCIO");
   const SceneDescription scene = read(inputs);
   for (const NamedFile& input : input_files(scene)) {
@@ -336,7 +338,7 @@ TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
     for (const fs::path& output : {input.path, folder_ / "folder/.." / input.path.filename(), hard, soft})
       EXPECT_THROW(check_files(scene, {{output, "--stats"}}), SceneError) << input.name << " by " << output;
   }
-  EXPECT_EQ(input_files(scene).size(), 10u) << "a new kind of input belongs into this test";
+  EXPECT_EQ(input_files(scene).size(), 11u) << "a new kind of input belongs into this test";
   EXPECT_NO_THROW(check_files(scene, {{folder_ / "new.json", "--stats"}}));
   EXPECT_NO_THROW(check_files(scene, {{"/dev/stdout", "--stats"}}));
 

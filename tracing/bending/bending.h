@@ -13,8 +13,8 @@
 
 #include <Eigen/Core>
 
-#include "volumes/bricks/brick_point.h"
 #include "volumes/bricks/tensor_field.h"
+#include "volumes/sampling/brick_point.h"
 
 namespace tensorray {
 

@@ -136,8 +136,8 @@ const Vector3i lattice_size(3, 4, 2);
 double value_at(const Vector3i& index, int c) { return 1 + index.x() + 10 * index.y() + 100 * index.z() + 1000 * c; }
 
 /// A file with these numbers. @param layout  Rank and sense of each axis, as the format writes it.
-std::string file_of(const std::string& layout, const std::string& datatype, int volumes = 6,
-                    const std::string& fields = "") {
+std::string mrtrix_file(const std::string& layout, const std::string& datatype, int volumes = 6,
+                        const std::string& fields = "") {
   const std::array<int, 4> extents{lattice_size.x(), lattice_size.y(), lattice_size.z(), volumes};
   std::array<int, 4> axis_of_rank{}, reversed{};
   for (std::size_t i = 0, at = 0; i < 4; ++i, at = layout.find(',', at) + 1) {
@@ -182,7 +182,7 @@ TEST(Mrtrix, EveryLayoutAndTypeGivesTheSameTensors) {
   for (const std::string layout : {"+0,+1,+2,+3", "-0,+1,-2,+3", "-1,+2,-3,+0", "+3,-2,+1,-0"})
     for (const std::string datatype : {"Float32LE", "Float64BE", "UInt16BE", "Int32"})
       for (const bool packed : {false, true}) {
-        const std::string contents = file_of(layout, datatype);
+        const std::string contents = mrtrix_file(layout, datatype);
         const test::TemporaryFile file(packed ? "a.mif.gz" : "a.mif", packed ? gzipped(contents) : contents);
         const TensorGrid grid = test::tensors_of(open_mrtrix(file));  // In the order of MRtrix, without being told.
         ASSERT_EQ(grid.active_voxels(), 24u);
@@ -196,8 +196,8 @@ TEST(Mrtrix, EveryLayoutAndTypeGivesTheSameTensors) {
 
 TEST(Mrtrix, TransformAndScalingAreApplied) {
   const test::TemporaryFile file(
-      "a.mif", file_of("+0,+1,+2,+3", "Float32LE", 9,
-                       "transform: 0,-1,0,10\ntransform: 1,0,0,20\ntransform: 0,0,1,30\nscaling: 5,0.5\n"));
+      "a.mif", mrtrix_file("+0,+1,+2,+3", "Float32LE", 9,
+                           "transform: 0,-1,0,10\ntransform: 1,0,0,20\ntransform: 0,0,1,30\nscaling: 5,0.5\n"));
   const Lattice lattice = open_mrtrix(file);
   Matrix3d linear;
   linear << 0, -2.5, 0, 2, 0, 0, 0, 0, 3;
@@ -208,15 +208,15 @@ TEST(Mrtrix, TransformAndScalingAreApplied) {
 }
 
 TEST(Mrtrix, TheUserGivesAnotherOrderWithItsAxes) {
-  const test::TemporaryFile file(
-      "a.mif", file_of("+0,+1,+2,+3", "Float32LE", 6, "transform: -1,0,0,0\ntransform: 0,1,0,0\ntransform: 0,0,1,0\n"));
+  const test::TemporaryFile file("a.mif", mrtrix_file("+0,+1,+2,+3", "Float32LE", 6,
+                                                      "transform: -1,0,0,0\ntransform: 0,1,0,0\ntransform: 0,0,1,0\n"));
   const auto v = [](int c) { return value_at({1, 1, 1}, c); };
   const Matrix3d fsl = (Matrix3d() << v(0), -v(1), -v(2), -v(1), v(3), v(4), -v(2), v(4), v(5)).finished();
   test::expect_near(fsl, test::voxel(test::tensors_of(open_mrtrix(file), TensorOrder::fsl), {1, 1, 1}));
 }
 
 TEST(Mrtrix, HeadersWithAFileOfNumbers) {
-  const std::string whole = file_of("+0,+1,+2,+3", "Float32LE");
+  const std::string whole = mrtrix_file("+0,+1,+2,+3", "Float32LE");
   const test::TemporaryFile data("a.dat", whole.substr(whole.size() - 24 * 6 * 4));
   const std::string header = whole.substr(0, whole.find("file:"));
   const test::TemporaryFile file("a.mih", header + "file: " + data.filename().string() + "\n");
@@ -224,7 +224,7 @@ TEST(Mrtrix, HeadersWithAFileOfNumbers) {
 }
 
 TEST(Mrtrix, DamageAndOtherKindsAreErrorsWithTheFile) {
-  const std::string sound = file_of("+0,+1,+2,+3", "Float32LE");
+  const std::string sound = mrtrix_file("+0,+1,+2,+3", "Float32LE");
   const auto expect = [](const std::string& contents, const std::string& word) {
     test::refuses(open_mrtrix, "bad.mif", contents, {word});
   };
@@ -248,7 +248,7 @@ TEST(Mrtrix, DamageAndOtherKindsAreErrorsWithTheFile) {
 
 TEST(Mrtrix, WithoutATransformTheMiddleIsTheOrigin) {
   // Names that begin as the last line are names.
-  const test::TemporaryFile file("a.mif", file_of("+0,+1,+2,+3", "Float32LE", 6, "END_of: 12:30\nENDIAN: x\n"));
+  const test::TemporaryFile file("a.mif", mrtrix_file("+0,+1,+2,+3", "Float32LE", 6, "END_of: 12:30\nENDIAN: x\n"));
   const Lattice lattice = open_mrtrix(file);
   EXPECT_EQ(lattice.to_world * Vector3d(0, 0, 0), Vector3d(-2, -3.75, -1.5));
   EXPECT_EQ(lattice.to_world * Vector3d(2, 3, 1), Vector3d(2, 3.75, 1.5));

@@ -64,13 +64,13 @@ TEST_F(ImportErrors, WrongArguments) {
     refuses({"image.vti", "--resolution", "8", "--error", error}, 2, {"--error", "1%"});
   refuses({"image.vti", "--voxel-size", "1", "--finest", "2"}, 2, {"--finest", "--voxel-size"});
   refuses({"image.vti", "--resolution", "8", "--finest", "0.1"}, 2, {"--finest", "--resolution"});
+  write("array.npy", npy());
   for (const char* const file : {"image.vti", "array.npy"})
     refuses({file, "--levels", "2"}, 2, {file, "--levels", "one size"});
   refuses({"image.vti", "--bounds", "1", "0", "0", "1", "0", "1"}, 2, {"--bounds"});
   refuses({"image.vti", "--origin", "0", "0", "0"}, 2, {"image.vti", "leave --origin out"});
   refuses({"image.vti", "--boundary", "body.stl"}, 2, {"--boundary", ".ply"});
   refuses({"image.vti", "-o", "image.txt"}, 2, {"--output"});
-  write("array.npy", npy());
   refuses({"array.npy", "--resolution", "8"}, 2, {"array.npy", "--resolution"});
   refuses({"array.npy", "--memory", "-1"}, 2, {"--memory"});
   expect_error("missing", {"import", "image.vti", "-q", "-o", "missing/image.vdb"}, 1);

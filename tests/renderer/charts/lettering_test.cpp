@@ -1,4 +1,3 @@
-#include "renderer/charts/ink.h"
 #include "renderer/charts/lettering.h"
 
 #include <cctype>
@@ -8,6 +7,7 @@
 #include <numeric>
 
 #include "base/constants.h"
+#include "renderer/charts/ink.h"
 #include "tests/names.h"
 
 namespace tensorray {

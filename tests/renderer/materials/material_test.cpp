@@ -3,8 +3,8 @@
 #include <complex>
 
 #include "base/constants.h"
-#include "renderer/materials/microfacet.h"
 #include "renderer/materials/metal_and_glass.h"
+#include "renderer/materials/microfacet.h"
 #include "renderer/sampling/random.h"
 #include "tests/renderer/statistics.h"
 

@@ -3,7 +3,7 @@
 #include <random>
 
 #include "tests/names.h"
-#include "volumes/bricks/brick_point.h"
+#include "volumes/sampling/brick_point.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {

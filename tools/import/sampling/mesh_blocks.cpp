@@ -71,11 +71,11 @@ Bins bins_of(const Solid& solid, const SamplingLattice& lattice, const BlockPlac
   return bins;
 }
 
-/// The numbers of the blocks with cells and voxels that are wanted, ordered by origin.
-std::vector<std::size_t> used_blocks(const Bins& bins, const BlockPlaces& places, const std::vector<VoxelSet>& wanted) {
+/// The numbers of the blocks with cells, ordered by origin.
+std::vector<std::size_t> used_blocks(const Bins& bins, const BlockPlaces& places) {
   std::vector<std::size_t> used;
   for (std::size_t block = 0; block + 1 < bins.first.size(); ++block)
-    if (bins.first[block] < bins.first[block + 1] && (wanted.empty() || wanted[block].any())) used.push_back(block);
+    if (bins.first[block] < bins.first[block + 1]) used.push_back(block);
   std::sort(used.begin(), used.end(), [&](std::size_t a, std::size_t b) {
     const Vector3i of_a = places.place(a), of_b = places.place(b);
     return std::lexicographical_compare(of_a.begin(), of_a.end(), of_b.begin(), of_b.end());
@@ -115,9 +115,9 @@ struct Workspace {
   std::array<int, TensorBlock::voxels> layer{};        ///< From which each voxel has its value.
 };
 
-/// The voxels of a block that stay inactive, whose centres are in a cell, and that are in cells of several layers.
+/// The voxels of a block whose centres are in a cell, and that are in cells of several layers.
 struct Filled {
-  VoxelSet unwanted, taken, overlaid;
+  VoxelSet taken, overlaid;
 };
 
 /// Sets the tensor of a voxel whose centre is in the loaded cell. Where layers overlap, cells without data do not
@@ -150,7 +150,7 @@ void fill_from_cell(const MeshSource& source, Workspace& work, vtkIdType id, Ten
       for (int z = from.z(); z <= to.z(); ++z) {
         const auto offset = static_cast<std::size_t>(TensorBlock::offset(x, y, z));
         const bool is_done = !source.layers || filled.overlaid[offset] || work.layer[offset] == source.layers[id];
-        if (filled.unwanted[offset] || (filled.taken[offset] && is_done)) continue;
+        if (filled.taken[offset] && is_done) continue;
         if (!is_loaded && !load(source, work.cell, id)) return;
         is_loaded = true;
         if (work.cell.find(source.lattice.position(block.origin + Vector3i(x, y, z)), source.tolerance))
@@ -160,9 +160,9 @@ void fill_from_cell(const MeshSource& source, Workspace& work, vtkIdType id, Ten
 
 /// @return the number of voxels in several layers.
 std::size_t fill_centres(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
-                         const VoxelSet& unwanted, TensorBlock& block) {
-  Filled filled{unwanted, {}, {}};
-  for (const vtkIdType* id = begin; id != end && (source.layers || !(filled.taken | unwanted).all()); ++id)
+                         TensorBlock& block) {
+  Filled filled;
+  for (const vtkIdType* id = begin; id != end && (source.layers || !filled.taken.all()); ++id)
     fill_from_cell(source, work, *id, block, filled);
   return filled.overlaid.count();
 }
@@ -304,10 +304,10 @@ Vector3d margin_of(const MeshSource& source) {
 
 }  // namespace
 
-TensorBlocks mesh_blocks(const MeshSource& source, const BlockPlaces& places, const std::vector<VoxelSet>& wanted,
-                         const Progress& progress, std::size_t& overlaid) {
+TensorBlocks mesh_blocks(const MeshSource& source, const BlockPlaces& places, const Progress& progress,
+                         std::size_t& overlaid) {
   Bins bins = bins_of(source.solid, source.lattice, places, margin_of(source));
-  const std::vector<std::size_t> used = used_blocks(bins, places, wanted);
+  const std::vector<std::size_t> used = used_blocks(bins, places);
   TensorBlocks blocks = make_blocks(used.size());
   const std::thread::id caller = std::this_thread::get_id();
   std::atomic<std::uint64_t> done{0};
@@ -325,7 +325,7 @@ TensorBlocks mesh_blocks(const MeshSource& source, const BlockPlaces& places, co
       vtkIdType* const end = bins.cells.data() + bins.first[used[i] + 1];
       if (source.layers) std::sort(begin, end, is_finer);
       blocks[i].origin = TensorBlock::size * places.place(used[i]);
-      in_layers += fill_centres(source, begin, end, work, wanted.empty() ? VoxelSet() : ~wanted[used[i]], blocks[i]);
+      in_layers += fill_centres(source, begin, end, work, blocks[i]);
       if (blocks[i].active.any()) average_voxels(source, begin, end, work, blocks[i]);
     }
     done += range.size();

@@ -1,7 +1,9 @@
 #include "tools/import/sampling/mesh_sampling.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -113,6 +115,18 @@ MeshSource on_lattice(const MeshSource& source, const SamplingLattice& lattice) 
           lattice,     source.layers,        source.tolerance};
 }
 
+/// Removes the blocks that are in no refined brick of the level before: of those, none of its voxels is in the mesh.
+void remove_orphans(const TensorBlocks& before, TensorBlocks& blocks) {
+  const auto place = [](const Eigen::Vector3i& origin, int doublings) {
+    return std::array{origin.x() >> (3 + doublings), origin.y() >> (3 + doublings), origin.z() >> (3 + doublings)};
+  };
+  std::set<std::array<int, 3>> refined;
+  for (const TensorBlock& block : before) refined.insert(place(block.origin, 1));
+  blocks.erase(std::remove_if(blocks.begin(), blocks.end(),
+                              [&](const TensorBlock& block) { return refined.count(place(block.origin, 2)) == 0; }),
+               blocks.end());
+}
+
 /// A level is refined where cells are smaller than its voxels and it differs from the mesh. Voxels whose size the user
 /// did not set are no more than a few times those of level 0 at most.
 void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settings, const Progress& progress,
@@ -126,7 +140,6 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
   const std::vector<float> sizes = cell_sizes(coarsest);
   SamplingLattice lattice = coarsest.lattice;
   BlockPlaces places(lattice.size);
-  std::vector<VoxelSet> wanted;  // Of the level; empty: all.
   std::size_t bricks = 0;
   for (int level = 1; level < settings.levels.value_or(max_levels); ++level) {
     if (lattice.size.maxCoeff() > largest || settings.finest.value_or(0) > 0.5 * rounded_one * lattice.voxel.minCoeff())
@@ -134,7 +147,7 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
     const MeshSource source = on_lattice(coarsest, lattice);
     const TensorBlocks& blocks = level == 1 ? grid.blocks : grid.finer.back();
     const double tolerance = error > 0 ? error * report.native_peak * std::pow(2, level - 1) : -1;
-    const auto missed = missed_cells({source, places, blocks, wanted}, sizes, tolerance);
+    const auto missed = missed_cells({source, places, blocks}, sizes, tolerance);
     const std::vector<bool> refined = bricks_to_refine(lattice, places, missed);
     const auto count = static_cast<std::size_t>(std::count(refined.begin(), refined.end(), true));
     if (count == 0) return;
@@ -145,9 +158,9 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
     places = BlockPlaces(half.size, places, refined);
     lattice = half;
     std::size_t overlaid = 0;
-    wanted = voxels_about(lattice, places, missed);
-    TensorBlocks filled = mesh_blocks(on_lattice(coarsest, lattice), places, wanted, progress, overlaid);
+    TensorBlocks filled = mesh_blocks(on_lattice(coarsest, lattice), places, progress, overlaid);
     remove_empty_blocks(filled);
+    if (level > 1) remove_orphans(blocks, filled);
     if (filled.empty()) return;
     grid.finer.push_back(std::move(filled));
     LevelReport& of_level = report.finer.emplace_back();
@@ -172,7 +185,7 @@ TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const
                           tolerance};
   TensorGrid grid;
   grid.to_world = Eigen::Translation3d(lattice.origin) * Eigen::Scaling(lattice.voxel);
-  grid.blocks = mesh_blocks(source, BlockPlaces(lattice.size), {}, progress, report.overlaid);
+  grid.blocks = mesh_blocks(source, BlockPlaces(lattice.size), progress, report.overlaid);
   remove_empty_blocks(grid.blocks);
   report.size = lattice.size;
   report.voxel = lattice.voxel;

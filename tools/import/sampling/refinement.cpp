@@ -74,7 +74,6 @@ class LevelVoxels {
       const std::optional<std::size_t> place = level_.places.number(index.x() / 8, index.y() / 8, index.z() / 8);
       if (!place) return 0;
       const auto offset = static_cast<std::size_t>(TensorBlock::offset(index.x() % 8, index.y() % 8, index.z() % 8));
-      if (!level_.wanted.empty() && !level_.wanted[*place][offset]) return 0;
       const TensorBlock* const block = block_[*place];
       if (block && block->active[offset]) values[static_cast<std::size_t>(i)] = block->values[offset].data();
       is_whole = is_whole && values[static_cast<std::size_t>(i)];
@@ -199,20 +198,6 @@ std::vector<bool> bricks_to_refine(const SamplingLattice& lattice, const BlockPl
           if (const std::optional<std::size_t> number = places.number(x, y, z)) refined[*number] = true;
   }
   return refined;
-}
-
-std::vector<VoxelSet> voxels_about(const SamplingLattice& lattice, const BlockPlaces& places,
-                                   const std::vector<Eigen::AlignedBox3d>& missed) {
-  std::vector<VoxelSet> wanted(places.count());
-  for (const Eigen::AlignedBox3d& box : missed) {
-    const Eigen::AlignedBox3i voxels = indices_of(lattice, box, margin);
-    for (int x = voxels.min().x(); x <= voxels.max().x(); ++x)
-      for (int y = voxels.min().y(); y <= voxels.max().y(); ++y)
-        for (int z = voxels.min().z(); z <= voxels.max().z(); ++z)
-          if (const std::optional<std::size_t> number = places.number(x / 8, y / 8, z / 8))
-            wanted[*number].set(static_cast<std::size_t>(TensorBlock::offset(x % 8, y % 8, z % 8)));
-  }
-  return wanted;
 }
 
 }  // namespace tensorray

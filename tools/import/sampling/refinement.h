@@ -18,7 +18,6 @@ struct SampledLevel {
   const MeshSource& source;  ///< With its lattice.
   const BlockPlaces& places;
   const TensorBlocks& blocks;
-  const std::vector<VoxelSet>& wanted;  ///< As mesh_blocks had it.
 };
 
 /// The boxes of the cells that a level misses: one of their points (or they, if tensors are at cells alone) is where
@@ -32,11 +31,6 @@ std::vector<Eigen::AlignedBox3d> missed_cells(const SampledLevel& level, const s
 /// Of each block of a level, by its number, whether its brick is to be refined: a cell that the level misses is in it,
 /// or up to two voxels beside it.
 std::vector<bool> bricks_to_refine(const SamplingLattice& lattice, const BlockPlaces& places,
-                                   const std::vector<Eigen::AlignedBox3d>& missed);
-
-/// The voxels of the next level that are needed, by number of the block: in cells that the level before misses, and up
-/// to two voxels beside them. In the rest of a brick the spline of the level before is as good.
-std::vector<VoxelSet> voxels_about(const SamplingLattice& lattice, const BlockPlaces& places,
                                    const std::vector<Eigen::AlignedBox3d>& missed);
 
 }  // namespace tensorray

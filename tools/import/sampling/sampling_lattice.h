@@ -59,9 +59,8 @@ struct MeshSource {
 };
 
 /// Those of the blocks that may have active voxels, as sample_mesh (mesh_sampling.h) describes them, ordered by origin.
-/// @param wanted  By number of the block, the voxels that may become active; empty: all.
 /// @param overlaid  Becomes the number of voxels that are in several layers.
-TensorBlocks mesh_blocks(const MeshSource& source, const BlockPlaces& places, const std::vector<VoxelSet>& wanted,
-                         const Progress& progress, std::size_t& overlaid);
+TensorBlocks mesh_blocks(const MeshSource& source, const BlockPlaces& places, const Progress& progress,
+                         std::size_t& overlaid);
 
 }  // namespace tensorray

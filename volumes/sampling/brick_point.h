@@ -1,5 +1,5 @@
 #pragma once
-/// @file volumes/bricks/brick_point.h
+/// @file volumes/sampling/brick_point.h
 /// A point relative to a brick, so that single precision resolves 1e-6 of a voxel in a field of any size.
 
 #include <algorithm>
