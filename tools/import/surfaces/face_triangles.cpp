@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -94,8 +95,8 @@ class Tessellation {
     Patch patch{face.corners, std::vector<Curve>(face.corners.size(), straight), nullptr, false};
     if (face.corners.size() != 4) return patch;
     const Vector3d &a = points_[face.corners[0]], &b = points_[face.corners[1]], &d = points_[face.corners[3]];
-    const Vector3d warp = a - b + points_[face.corners[2]] - d;
-    if (warp.norm() > 4 * tolerance_)
+    const Vector3d c2 = points_[face.corners[2]], warp = a - b + c2 - d;
+    if (std::abs((c2 - a).cross(d - b).normalized().dot(warp)) > 4 * tolerance_)
       patch.at = [=](const Vector2d& c) -> Vector3d { return a + c.x() * (b - a) + c.y() * (d - a) + c.prod() * warp; };
     return patch;
   }
