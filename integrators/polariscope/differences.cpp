@@ -112,7 +112,7 @@ DifferenceSampler::DifferenceSampler(const TensorField& field, const Eigen::Vect
 const float* DifferenceSampler::coefficients_of(const TensorBrick& brick) {
   if (!(brick.strongest > 0)) return nullptr;
   const std::size_t place = reinterpret_cast<std::uintptr_t>(brick.bending) / 64 * 0x9E3779B97F4A7C15u >> 55;
-  Converted& found = converted_[place % kept_bricks];
+  Converted& found = converted_[place];
   if (found.of == brick.bending) return found.values.data();
   found.of = brick.bending;
   found.values.resize(2 * CubicBrick::coefficients);

@@ -1,6 +1,7 @@
 #include "integrators/polariscope/load_polariscope.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -73,7 +74,11 @@ double greatest_integral(const Scene& scene, PolarizedLight light) {
 }
 
 /// A number as it is printed, so that a scene can have the same.
-double rounded(double value) { return std::stod(fmt::format("{:.6g}", value)); }
+double rounded(double value) {
+  const std::string text = fmt::format("{:.6g}", value);
+  std::from_chars(text.data(), text.data() + text.size(), value);  // In any locale.
+  return value;
+}
 
 double choose_coefficient(const Scene& scene, const PolarizedLight& light, double unit_length, double wavelength,
                           std::vector<std::string>& notes) {
@@ -114,10 +119,8 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
   const double wavelength = loaded.wavelength = light.bands[light.reference].wavelength;
   if (scene.description.light.aperture) {
     light.aperture.emplace();
-    for (const Eigen::Vector2d& corner : scene.beam.aperture) {
-      const Eigen::Vector3d from_start = scene.beam.start(corner) - light.start;
-      light.aperture->extend(Eigen::Vector2d(from_start.dot(light.right), from_start.dot(light.up)));
-    }
+    for (const Eigen::Vector2d& corner : scene.beam.aperture) light.aperture->extend(corner);
+    light.aperture_axes << scene.beam.right.transpose(), scene.beam.up.transpose();
   }
   light.relative = [wavelength](double other) { return wavelength / other; };
   if (const auto* file = std::get_if<std::filesystem::path>(&settings.stress_optic)) {
@@ -134,6 +137,8 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
     loaded.is_automatic = true;
     loaded.stress_optic = choose_coefficient(scene, light, settings.unit_length, wavelength, notes);
   }
+  if (!std::isfinite(static_cast<float>(loaded.stress_optic * settings.unit_length * scene.field.max_norm())))
+    throw std::runtime_error("`/integrator/stress_optic` times the field is beyond single precision; check its units");
   light.strength = pi * loaded.stress_optic * settings.unit_length / (wavelength * nanometre);
   loaded.arrangement = turned(arrangement_of(settings.arrangement), settings.angle, settings.analyzer);
   return loaded;

@@ -108,7 +108,7 @@ void PolarTracer::find_steps(Ray& ray) const {
   const Vector3d& k = light_.direction;
   const Vector3d from_start = ray.origin - light_.start;
   if (light_.aperture) {
-    ray.is_lit = light_.aperture->contains(Eigen::Vector2d(from_start.dot(light_.right), from_start.dot(light_.up)));
+    ray.is_lit = light_.aperture->contains(Eigen::Vector2d(light_.aperture_axes * from_start));
     if (!ray.is_lit) return;
   }
   if (!geometry_.surfaces().obstacles.empty()) {

@@ -23,8 +23,10 @@ namespace tensorray {
 struct PolarizedLight {
   Eigen::Vector3d direction, right, up;  ///< k, u and w: unit, normal to each other.
   Eigen::Vector3d start;                 ///< A point of a plane across the light, before all that it meets.
-  /// From u and w about `start`, the rectangle that light comes through; none: light is everywhere.
+  /// The rectangle about `start` that light comes through, and its axes, which may not be u and w; none: light is
+  /// everywhere.
   std::optional<Eigen::AlignedBox2d> aperture;
+  Eigen::Matrix<double, 2, 3> aperture_axes = Eigen::Matrix<double, 2, 3>::Zero();
 
   std::vector<Band> bands;    ///< Without any, only integrals and lengths are found.
   std::size_t reference = 0;  ///< The band whose middle is the reference wavelength.
@@ -37,7 +39,7 @@ struct PolarizedLight {
   int samples = 2;  ///< Of a pixel, along x and along y; > 0.
 };
 
-/// What is known of the light of a pixel's middle. The phases are those of the reference wavelength.
+/// What is known of the light of a pixel, the mean of its samples. The phases are those of the reference wavelength.
 struct PolarPoint {
   float phase = 0, azimuth = 0, rotation = 0;  ///< EquivalentRetarder.
   float integral = 0;  ///< 2π C/λ ∫(σ₁' − σ₂') dz, mean of the samples in the field.

@@ -59,7 +59,10 @@ std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const
   }
   const auto* word = std::get_if<ArrangementWord>(&settings.arrangement);
   const bool has_sign = word && *word == ArrangementWord::tint;
-  const double twice = (settings.angle + 45) * pi / 90;  // Twice the slow axis.
+  const std::vector<Element>& before = loaded.arrangement.before;
+  const auto first = std::find_if(before.begin(), before.end(),
+                                  [](const Element& element) { return element.kind == ElementKind::polarizer; });
+  const double twice = ((first == before.end() ? settings.angle : first->angle) + 45) * pi / 90;  // The slow axis.
   const ValueRange range{has_sign ? -greatest : 0, greatest};
   const auto color = [=](double position) {
     const double phase = pi * range.value(position) / loaded.wavelength;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -20,7 +22,8 @@ namespace tensorray {
 namespace {
 
 constexpr std::size_t rows_per_round = 64;  // That are traced before others get them.
-constexpr double few_orders = 0.02;         // A picture with fewer shows nothing.
+constexpr double few_orders = 0.02;         // A picture with fewer shows nothing,
+constexpr double most_orders = 1000;        // and one with more shows grey.
 
 /// What is known of a pixel.
 struct PolarPixel {
@@ -136,7 +139,10 @@ class LoadedPolariscope : public LoadedMethod {
 
   Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
 
-  Strength strength(const Scene&) const override { return {"integrator", "stress_optic", loaded_.stress_optic}; }
+  Strength strength(const Scene&) const override {
+    return {"integrator", "stress_optic", loaded_.stress_optic,
+            std::holds_alternative<std::filesystem::path>(settings_.stress_optic)};
+  }
 
  private:
   using Rows = std::vector<LightRow>;
@@ -153,8 +159,20 @@ std::string LoadedPolariscope::traced_key(const Scene& scene) const {
   Json json = Json::parse(scene.description.text);
   for (const char* key : {"output", "camera", "lights", "objects", "seed"}) json.erase(key);
   for (const char* key : {"arrangement", "angle", "analyzer", "type"}) json["integrator"].erase(key);
+  std::string files;
+  for (const NamedFile& input : input_files(scene.description)) {
+    std::error_code none;
+    files += fmt::format(" {}", std::filesystem::last_write_time(input.path, none).time_since_epoch().count());
+  }
   const Eigen::Vector3d& V = loaded_.light.direction;
-  return json.dump() + fmt::format(" {} {} {} {}", V.x(), V.y(), V.z(), loaded_.stress_optic);
+  return json.dump() + files + fmt::format(" {} {} {} {}", V.x(), V.y(), V.z(), loaded_.stress_optic);
+}
+
+/// The slow axis, of an order that is not wrapped. @param azimuth  Of the wrapped retardance, of which the other axis
+/// is the slow one in the upper half of an order.
+double slow_axis(double order, double azimuth) {
+  if (order - std::floor(order) <= 0.5) return azimuth;
+  return azimuth > 0 ? azimuth - pi / 2 : azimuth + pi / 2;
 }
 
 /// What is shown of the picture, which may not be complete.
@@ -173,6 +191,10 @@ Render LoadedPolariscope::render_of(const Scene& scene, const PolarPicture& pict
     result.warnings.push_back(
         "the picture shows almost nothing: the retardance is far below a wavelength; check the units of "
         "`integrator.stress_optic` and `integrator.unit_length`, or leave the first to \"auto\"");
+  if (order > most_orders)
+    result.warnings.push_back(
+        "fringes are too fine to be seen: the retardance is more than a thousand wavelengths; check the units of "
+        "`integrator.stress_optic` and `integrator.unit_length`, or leave the first to \"auto\"");
   result.metadata = {{"tensorray:stress_optic", fmt::format("{:.17g}", loaded_.stress_optic)},
                      {"tensorray:wavelength", fmt::format("{:.17g}", loaded_.wavelength)}};
   if (scene.description.output.wants(Annotation::legend))
@@ -180,7 +202,8 @@ Render LoadedPolariscope::render_of(const Scene& scene, const PolarPicture& pict
   result.describe_pixel = [wavelength = loaded_.wavelength](const float* pixel) {
     return std::vector<std::pair<std::string, std::string>>{
         {"order", fmt::format("{:.3f} at {:.1f} nm", pixel[integral_channel] / wavelength, wavelength)},
-        {"slow axis", fmt::format("{:.1f} degrees", pixel[azimuth_channel] * 180 / pi)}};
+        {"slow axis", fmt::format("{:.1f} degrees",
+                                  slow_axis(pixel[integral_channel] / wavelength, pixel[azimuth_channel]) * 180 / pi)}};
   };
   return result;
 }

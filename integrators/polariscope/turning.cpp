@@ -98,7 +98,7 @@ void TurningSteps::add(double h, double a1, double b1, double a2, double b2) {
   const double alpha = h * (a1 + a2) / 2, beta = h * (b1 + b2) / 2, gamma = gauss_point * h * h * (a2 * b1 - a1 * b2);
   const double length = greatest * std::sqrt(alpha * alpha + beta * beta + std::pow(greatest * gamma, 2));
   if (!(length > 0)) return;
-  const int halvings = length > 1 ? std::min(1 + std::ilogb(length), most_halvings) : 0;
+  const int halvings = length > 1 ? std::ilogb(std::min(length, std::ldexp(1.0, most_halvings - 1))) + 1 : 0;
   const double part = halvings > 0 ? std::ldexp(1.0, -halvings) : 1;
   steps.push_back(
       {static_cast<float>(part * alpha), static_cast<float>(part * beta), static_cast<float>(part * gamma), halvings});

@@ -58,6 +58,8 @@ def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: 
     if isinstance(scene, Field) and field is None:
         scene, field = None, scene
     if isinstance(scene, (str, os.PathLike)) and needs_import(scene):
+        if field is not None:
+            raise ValueError("field: the scene is a file that is imported as one; give one of them")
         scene, field = None, import_file(scene, **(imports or {}), progress=progress)
     elif imports:
         raise ValueError("imports: only files that have to be imported have these choices")
@@ -111,7 +113,7 @@ class Render:
 
     @functools.cached_property
     def spectral(self) -> NDArray[np.float32] | None:
-        """Spectral irradiance, unit of the light's irradiance per nm: float32, shape (height, width, bands). Needs
+        """Spectral irradiance (of the polariscope, radiance), unit of the light's irradiance per nm: float32, shape (height, width, bands). Needs
         keep=["spectral"]; else None."""
         spectral = self._rendered.spectral()
         return None if spectral is None else spectral[0][:, :, -len(self.wavelengths):]

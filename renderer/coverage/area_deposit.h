@@ -11,8 +11,8 @@
 
 namespace tensorray {
 
-/// Sums of four planes, pixel by pixel: those of pixel x of row y, counted from the first row that is kept, are at [4
-/// (y · stride + x)].
+/// Sums of four planes, pixel by pixel: those of pixel x of row y, counted from the first row that is kept, are at
+/// [4 (y · stride + x)].
 struct DepositPlanes {
   static constexpr std::size_t count = 4;
   std::uint64_t* sums = nullptr;

@@ -13,6 +13,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+static_assert(std::variant_size_v<decltype(Material::scattering)> == 4, "the functions below name the kinds");
+
 Diffuse prepare(const Diffuse& settings) { return settings; }
 
 /// The model of glass; null if the material is another one.

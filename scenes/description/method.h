@@ -39,6 +39,7 @@ struct Strength {
   const char* section;
   const char* key;
   double value;
+  bool is_fixed = false;  ///< A file gives the value: no number takes its place.
 };
 
 /// A method that has loaded everything that it needs for a scene. Immutable: any number of threads may render with it.

@@ -89,7 +89,7 @@ inline void describe(WavelengthKeys& keys, KeyVisitor& visit) {
 
 inline void describe(LightDescription& light, KeyVisitor& visit) {
   visit("direction", light.direction,
-        "direction in which light travels, of any length; auto: of the six axis directions, the one in which light "
+        "direction in which light travels, of any length; auto: of 26 directions, the one in which light "
         "shows most of the field",
         not_zero().or_word("auto").as_knob());
   visit("up", light.up, "up axis of aperture and receiver; default: +z, or +y for light along z", not_zero());

@@ -179,19 +179,13 @@ void note_pixels(const ReceiverDescription& receiver, const Plate& plate, std::v
                   pixel.x() > pixel.y() ? "high" : "wide", square.x(), square.y()));
 }
 
-/// Where light falls on the plate before it has crossed the volume, the picture does not show what bends it then.
-void note_place(const Plate& plate, const Beam& beam, const TensorField& field, std::vector<std::string>& notes) {
-  const double towards = plate.normal().dot(beam.direction) > 0 ? 1 : -1;
-  double nearest = std::numeric_limits<double>::infinity(), farthest = -nearest;
-  for (const Eigen::Vector3d& corner : field.corners()) {
-    const double behind = towards * (corner - plate.center).dot(plate.normal());
-    nearest = std::min(nearest, behind);
-    farthest = std::max(farthest, behind);
-  }
+/// Where light falls on the plate before it has crossed the volume, the picture does not show what is behind.
+void note_place(const Plate& plate, const TensorField& field, std::vector<std::string>& notes) {
+  const auto [nearest, farthest] = depth_range(field, plate.center, -plate.normal());  // The plate faces the light.
   if (farthest > 1e-6 * (farthest - nearest))
     notes.push_back(
         fmt::format("warning: the plate lies {} the volume as the light sees it, so that light falls on it "
-                    "before the field bends it; move `receiver.center` along the light, or leave it out",
+                    "before the field has acted on it; move `receiver.center` along the light, or leave it out",
                     nearest < 0 ? "in" : "before"));
 }
 
@@ -275,7 +269,9 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
       scale.median_turn, scale.greatest_turn, 100 * scale.shown));
   if (given && (scale.shown < visible || scale.median_turn > much) &&
       description.integrator.method().needs_light_direction(description)) {
-    const std::string advice = advice_on(scale, choose_scale(field, volume, light, progress));
+    AutoScale best = choose_scale(field, volume, light, progress);
+    best.scale *= probe_flexibility / std::abs(flexibility);
+    const std::string advice = advice_on(scale, best);
     if (!advice.empty()) notes.push_back(advice);
   }
   return scale;
@@ -286,8 +282,10 @@ Eigen::Vector3d load_direction(const SceneDescription& description, const Tensor
                                std::vector<std::string>& notes) {
   if (description.light.direction) return *description.light.direction;
   if (!description.integrator.method().bends_light()) {
-    int shortest = 2;
-    field.world_box().sizes().minCoeff(&shortest);
+    const Eigen::Vector3d sizes = field.world_box().sizes();
+    int shortest = 2;  // Also of a cube.
+    for (const int axis : {1, 0})
+      if (sizes[axis] < (1 - 1e-6) * sizes[shortest]) shortest = axis;
     const Eigen::Vector3d V = -Eigen::Vector3d::Unit(shortest) + Eigen::Vector3d::Zero();
     notes.push_back(fmt::format("light: along [{:g}, {:g}, {:g}], where the field is thinnest", V.x(), V.y(), V.z()));
     return V;
@@ -374,7 +372,8 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
   Beam beam = make_beam(description, loaded.field);
   Geometry geometry(load_surfaces(description, loaded.field, beam));
   note_pixels(description.receiver, *geometry.surfaces().plate, notes);
-  if (description.receiver.center) note_place(*geometry.surfaces().plate, beam, loaded.field, notes);
+  if (description.receiver.center && description.integrator.method().shows_plate())
+    note_place(*geometry.surfaces().plate, loaded.field, notes);
   Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(light.color));
   scene.kept = std::move(loaded.kept);
   scene.eigenvalues = loaded.eigenvalues;

@@ -32,8 +32,9 @@ std::vector<int> parse_frames(const std::string& text);
 /// path_text.h) by the frame's number.
 ///
 /// Keyframes take the place of a number or of a list of numbers:
-/// {"keys": [[1, [0, 0, -1]], [240, [0, 1, -1]]], "ease": "smooth"} Before the first key and behind the last one their
-/// values hold. "linear" (the default) goes straight to the next, "smooth" by t²(3 − 2t).
+/// {"keys": [[1, [0, 0, -1]], [240, [0, 1, -1]]], "ease": "smooth"}
+/// Before the first key and behind the last one their values hold. "linear" (the default) goes straight to the next,
+/// "smooth" by t²(3 − 2t).
 /// @throw SceneError, with the place, if keyframes are not like this.
 void set_frame(Json& scene, int frame, const SceneSource& source);
 

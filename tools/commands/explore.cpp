@@ -32,7 +32,8 @@ constexpr std::array<double, 3> factors{0.5, 1, 2};  // Of the strength; one row
 /// Small pictures of photons: quick, however chaotic the light is.
 const std::vector<std::string> quick{"integrator.density={\"kind\":\"gaussian\",\"tau\":1}", "light.photons=20480",
                                      "light.wavelengths.count=16", "light.wavelengths.per_photon=4"};
-constexpr int gap = 8;  // Pixels about the pictures.
+constexpr std::size_t quick_in_one_color = 2;  // The first of them.
+constexpr int gap = 8;                         // Pixels about the pictures.
 
 constexpr std::size_t columns = 6;  // Directions of the light.
 
@@ -157,10 +158,15 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
     const std::string direction = fmt::format("light.direction=[{},{},{}]", V.x(), V.y(), V.z());
     load(with(options, {direction}));
     const Strength strength = scene->method->strength(*scene);
+    if (strength.is_fixed)
+      throw std::invalid_argument(
+          fmt::format("explore: `{}.{}` is a file, and has no scale; give a number", strength.section, strength.key));
     const std::string pixels = pixels_of(*scene->geometry.surfaces().plate, options.size);
     for (std::size_t row = 0; row < factors.size(); ++row) {
       const std::string scaled = fmt::format("{}.{}={}", strength.section, strength.key, factors[row] * strength.value);
       std::vector<std::string> changes = quick;
+      const LightDescription& light = scene->description.light;
+      if (light.wavelength_min == light.wavelength_max) changes.resize(quick_in_one_color);
       changes.insert(changes.end(),
                      {direction, scaled, pixels, fmt::format("camera.resolution=[{0},{0}]", options.size),
                       fmt::format("integrator.stretch.pixels={}", options.size)});

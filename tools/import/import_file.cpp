@@ -101,8 +101,12 @@ void warn_of_same(const TensorGrid& grid, ImportReport& report) {
                                                 : "all tensors are zero; check the array and the step of time");
 }
 
+bool wants_levels(const ImportSettings& settings) {
+  return settings.sampling.levels.value_or(1) > 1 || settings.sampling.finest || settings.sampling.error;
+}
+
 TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings, ImportReport& report) {
-  if (settings.sampling.levels.value_or(1) > 1 || settings.sampling.finest || settings.sampling.error)
+  if (wants_levels(settings))
     throw std::invalid_argument("has voxels of one size, which are kept: leave --levels, --finest and --error out");
   if (!settings.boundary.empty()) throw std::invalid_argument("has voxels, which have no body: leave --boundary out");
   if (settings.take == Take::tensor && !settings.array.empty() && lattice.array.empty())
@@ -179,6 +183,8 @@ vtkSmartPointer<vtkDataSet> slab_of_flat(vtkSmartPointer<vtkDataSet> data, Impor
   if (!flat && settings.thickness) throw std::invalid_argument("is not flat: leave --thickness out");
   if (!flat) return data;
   if (!settings.boundary.empty()) throw std::invalid_argument("is flat, and has no body: leave --boundary out");
+  if (wants_levels(settings))
+    throw std::invalid_argument("is flat, and gets voxels of one size: leave --levels, --finest and --error out");
   report.thickness = settings.thickness.value_or(flat->edge);
   settings.sampling.flat_axis = flat->axis;
   if (!wants_sampling(settings)) {

@@ -59,8 +59,8 @@ std::vector<std::filesystem::path> outputs_of(const SceneDescription& descriptio
 /// - the rays of the light on a plate, up to where they leave the volume, while `field`, `bending` and the direction of
 ///   the light stay;
 /// - what the method keeps of the field (KeptResults), while the field stays;
-/// - the picture in linear light, while `output` changes only in `exposure`, `display` and `view`. Each picture is the
-/// same, bit for bit, as if rendered from the beginning. One thread at a time may use it.
+/// - the picture in linear light, while `output` changes only in `exposure`, `display` and `view`.
+/// Each picture is the same, bit for bit, as if rendered from the beginning. One thread at a time may use it.
 class LiveScene {
  public:
   /// @param file  The scene's file; its folder is that of relative paths.

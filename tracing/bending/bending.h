@@ -53,10 +53,9 @@ struct BendingSettings {
   /// Arc length of a step, in voxels along the ray (a step of 1 has length 1 in index space), of the finest level where
   /// the step begins. 0 means automatic: ½ voxel, or shorter where the field is strong, so that
   /// |σ| h ‖T − ⅓ tr(T) I‖ (Frobenius) ≤ 0.2 with the last sampled T (Eq. 9, read dimensionally). An automatic step of
-  /// `splitting`, which is stable, is never shorter than 1/64
-  /// voxel. Steps of `splitting4` follow its error if they are automatic, and are of at most 6 voxels. For the other
-  /// adaptive methods, `step` is the length of the first step and the limit of all steps; if it is 0, the limit is 2
-  /// voxels.
+  /// `splitting`, which is stable, is never shorter than 1/64 voxel. Steps of `splitting4` follow its error if they are
+  /// automatic, and are of at most 6 voxels. For the other adaptive methods, `step` is the length of the first step and
+  /// the limit of all steps; if it is 0, the limit is 2 voxels.
   double step = 0;
   double tolerance = 1e-3;  ///< Adaptive methods: greatest error estimate of a step, in voxels of level 0, and, but for
                             ///< `splitting4`, in radians; > 0. Differentials do not count.

@@ -1,11 +1,14 @@
 #include "tracing/bending/geometry.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <tuple>
 #include <utility>
+
+#include <tbb/parallel_for.h>
 
 namespace tensorray {
 namespace {
@@ -41,6 +44,7 @@ TriangleMesh grown(const std::vector<Part>& parts, double margin) {
       const Eigen::Vector3d middle = (at[i] + at[j] + at[k]) / 3;
       const double longest = std::max({(at[j] - at[i]).norm(), (at[k] - at[j]).norm(), (at[i] - at[k]).norm()});
       const double to_edge = (at[j] - at[i]).cross(at[k] - at[i]).norm() / longest / 3;
+      if (!(to_edge > 0)) continue;  // Nothing meets it.
       const double factor = 1 + (margin < 1e3 * to_edge ? margin / to_edge : 1e3);
       const auto first = static_cast<std::uint32_t>(result.vertices.size());
       for (const std::uint32_t corner : {i, j, k}) result.vertices.push_back(middle + factor * (at[corner] - middle));
@@ -96,24 +100,25 @@ struct Geometry::State {
     return true;
   }
 
-  /// By lines through the triangles, or through many of them.
+  /// By a line through each triangle; a mesh of very many counts as not plain, which is slower and as right.
   bool find_whether_plain() const {
-    if (!surfaces.cut) return false;
+    constexpr std::size_t most = 1 << 20;
+    if (!surfaces.cut || surfaces.cut->triangles.size() > most) return false;
     const TriangleMesh& mesh = *surfaces.cut;
     const double far = 1.1 * cut.boxes[0].diagonal().norm();
-    Crossings all;
-    const auto is_plain = [&](const Eigen::Vector3d& middle, const Eigen::Vector3d& direction) {
-      cross_cut(middle, direction, -far, far, all);
-      return all.size() >= 2 && all.front().sign < 0 && all.back().sign > 0 && alternate(all);
-    };
-    for (std::size_t i = 0; i < mesh.triangles.size(); i += 1 + mesh.triangles.size() / (1 << 16)) {
+    std::atomic<bool> is_plain{true};
+    tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t i) {
+      if (!is_plain) return;
+      Crossings all;
       const auto& [a, b, c] = mesh.triangles[i];
       const Eigen::Vector3d middle = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3;
-      if (std::none_of(generic_directions.begin(), generic_directions.end(),
-                       [&](const auto& direction) { return is_plain(middle, direction); }))
-        return false;
-    }
-    return true;
+      const auto is_plain_along = [&](const auto& direction) {
+        cross_cut(middle, direction, -far, far, all);
+        return all.size() >= 2 && all.front().sign < 0 && all.back().sign > 0 && alternate(all);
+      };
+      if (std::none_of(generic_directions.begin(), generic_directions.end(), is_plain_along)) is_plain = false;
+    });
+    return is_plain;
   }
 
   /// @throw std::invalid_argument if single precision does not reach the mesh.

@@ -86,7 +86,7 @@ struct alignas(64) Packet {
   PerRay last[3];          // Last cell, relative to the brick.
   PerRay leaf_low[3], leaf_high[3], leaf_last[3];  // The same as seen from the leaf; only if the field has levels.
   PerRay log_radiance_scale;  // Λ since the ray entered the packet; not of rays with differentials.
-  PerRay first[3], scale;     // LeafBrick::first and scale.
+  PerRay first[3], scale;     // LeafBrick::first and scale; before find_bricks, the point whose leaf is wanted.
 
   // The step that is being taken:
   PerRay time;            // Its length, world units.

@@ -14,7 +14,6 @@ namespace {
 using Eigen::Matrix2d;
 using Eigen::Vector3d;
 
-constexpr double probe_flexibility = 0.2;
 constexpr double wanted_part = 0.85;   // Of the greatest AutoScale::shown.
 constexpr double tangled_part = 0.75;  // A scale that shows less than this part of a lesser one tangles light.
 constexpr double max_turn = 0.4;       // AutoScale::median_turn; light that turns more leaves the plate.

@@ -17,6 +17,8 @@
 
 namespace tensorray {
 
+constexpr double probe_flexibility = 0.2;  ///< s of the light that chooses.
+
 struct AutoScale {
   double scale = 1;
   double median_turn = 0;    ///< Turn of the median bent ray from start to end, radians, at s = 0.2 and this scale.

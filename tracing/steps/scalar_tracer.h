@@ -366,7 +366,7 @@ class Tracer {
   /// which it led: samples might miss what is there.
   bool control_step(const State<N>& error) {
     using namespace step_lengths;
-    const double finer = std::max(1.0, sampler_.scale() / scale_);
+    const double finer = std::max(1.0, sampler_.take_finest_scale() / scale_);
     const double excess =
         std::max(error.position().norm() / (scale_ * voxel_), error.direction().norm()) / settings_.tolerance;
     const double order = is_composed() ? composed_order : runge_kutta(settings_.method)->order;
@@ -410,6 +410,7 @@ class Tracer {
       first_end = nullptr;
       State<N> next, error;
       if (event == Event::none) {
+        sampler_.take_finest_scale();  // Of what was before this step.
         next = step(h, error);
         if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
         if (is_controlled_ && control_step(error) && wanted > step_lengths::shortest_adaptive * voxel_) continue;

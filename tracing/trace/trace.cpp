@@ -172,6 +172,18 @@ std::vector<std::size_t> first_rays(const RayBatch& batch) {
   return firsts;
 }
 
+/// What set_end has written of one ray, for another one that takes the same way.
+template <int N>
+void copy_end(RayBatch& batch, std::size_t from, std::size_t to) {
+  batch.end[to] = batch.end[from];
+  batch.position[to] = batch.position[from];
+  batch.direction[to] = batch.direction[from];
+  if constexpr (N == 3) batch.differentials[to] = batch.differentials[from];
+  if (batch.wants_log_radiance_scale) batch.log_radiance_scale[to] = batch.log_radiance_scale[from];
+  batch.length[to] = batch.length[from];
+  batch.steps[to] = batch.steps[from];
+}
+
 /// Moves the rays of the batch to the points where they begin to bend, those of one origin together. Sets the end of
 /// rays that do not reach the field.
 template <int N>
@@ -183,6 +195,7 @@ void approach(const TensorField& field, const BendingSettings& settings, RayBatc
     strongest = std::max(strongest, std::abs(strength_of(batch, i, settings)));
   const std::vector<std::size_t> firsts = first_rays(batch);
   std::vector<std::size_t> places(batch.size(), none);  // Of each ray in the kernel.
+  std::vector<char> has_ended(batch.size(), 0);         // Before the field.
   for (std::size_t i = 0; i < batch.size(); ++i) {
     const double strength = strength_of(batch, i, settings);
     if (const std::size_t place = places[firsts[i]]; place != none && std::isfinite(strength)) {
@@ -190,8 +203,14 @@ void approach(const TensorField& field, const BendingSettings& settings, RayBatc
       add_copy(place, strength, i, traced);
       continue;
     }
+    if (has_ended[firsts[i]] != 0 && std::isfinite(strength)) {
+      copy_end<N>(batch, firsts[i], i);
+      if (records) records[i].before = records[firsts[i]].before;
+      continue;
+    }
     const auto end = tracer.approach(start_of<N>(batch, i), before(records, i));
     if (end || !std::isfinite(strength)) {
+      has_ended[i] = std::isfinite(strength);
       set_end(batch, i, std::isfinite(strength) ? *end : RayEnd::degenerate, tracer);
       continue;
     }

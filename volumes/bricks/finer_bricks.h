@@ -4,7 +4,8 @@
 /// 1988). A spline on voxels of size h is one on voxels of size h / 2, whose coefficients follow from
 /// B(x) = Σ m[k] B(2x − k), m = (1 4 6 4 1) / 8. A level adds details to it: coefficients of B-splines that are zero
 /// outside the refined bricks, so that the sum is twice continuously differentiable across levels. Details interpolate
-/// what is left of the level's values.
+/// what is left of the level's values, axis after axis: exactly where the refined bricks are a box, and nearly at the
+/// corners of other regions.
 
 #include <vector>
 

@@ -32,16 +32,6 @@ void require_extent(const std::filesystem::path& path, const Eigen::Vector3i& mi
                  "; the file is damaged, or its grid has to be moved to the origin");
 }
 
-/// Checks that blocks fit in the memory that there is. A bound (--memory) is checked elsewhere.
-void require_memory(const std::filesystem::path& path, std::size_t blocks, std::size_t block_bytes) {
-  if (memory_bound()) return;
-  const double bytes = static_cast<double>(blocks) * static_cast<double>(block_bytes);
-  const MemoryLimit limit = memory_limit();
-  if (bytes > limit.bytes)
-    fail(path, "its active voxels need " + bytes_text(bytes) + ", more than " + limit.cause + ", " +
-                   bytes_text(limit.bytes) + "; resample it more coarsely, or give --memory");
-}
-
 /// Calls `visit(tree)` with the grid's tree as its actual type.
 template <class Visit>
 void with_tree(const FieldGrid& grid, const Visit& visit) {
@@ -174,6 +164,15 @@ void put_grids(const std::filesystem::path& path, const std::vector<FieldGrid>& 
 }
 
 }  // namespace
+
+void require_memory(const std::filesystem::path& path, std::size_t blocks, std::size_t block_bytes) {
+  if (memory_bound()) return;
+  const double bytes = static_cast<double>(blocks) * static_cast<double>(block_bytes);
+  const MemoryLimit limit = memory_limit();
+  if (bytes > limit.bytes)
+    fail(path, "its active voxels need " + bytes_text(bytes) + ", more than " + limit.cause + ", " +
+                   bytes_text(limit.bytes) + "; resample it more coarsely, or give --memory");
+}
 
 std::vector<BlockShape> find_blocks(const std::filesystem::path& path, const std::vector<FieldGrid>& grids,
                                     std::size_t block_bytes) {

@@ -22,6 +22,10 @@ struct FieldGrid {
 
 inline openvdb::Coord coord_of(const Eigen::Vector3i& index) { return {index.x(), index.y(), index.z()}; }
 
+/// Checks that blocks fit in the memory that there is. A bound (--memory) is checked elsewhere.
+/// @throw std::runtime_error naming the file.
+void require_memory(const std::filesystem::path& path, std::size_t blocks, std::size_t block_bytes);
+
 /// The blocks that have an active voxel in one of the grids, ordered by origin.
 /// @param block_bytes  What a block will need in memory.
 /// @throw std::runtime_error naming the file, if voxels are out of range or fit in no memory; std::bad_alloc.

@@ -23,7 +23,7 @@ namespace {
 constexpr double max_half = 65504;
 
 /// What a field needs at least for a block, when its tensors are symmetric (TensorBrick).
-constexpr std::size_t min_brick_bytes = 14000;
+constexpr std::size_t min_brick_bytes = 14000, cubic_brick_bytes = 32000;
 
 /// Whether two transforms differ by less than a millionth of a voxel per voxel, and by less than a thousandth of a
 /// voxel anywhere.
@@ -111,20 +111,28 @@ TensorBlocks derived_blocks(const std::filesystem::path& path, const std::vector
                                    : gradient(samples, to_index);
 }
 
+using Places = std::set<std::array<int, 3>>;
+
+Places::value_type place_of(const Eigen::Vector3i& voxel, int doublings) {
+  const Eigen::Vector3i place = voxel.unaryExpr([&](int i) { return i >> (3 + doublings); });
+  return {place.x(), place.y(), place.z()};
+}
+
+/// The bricks of the level before that blocks refine.
+Places refined_by(const std::vector<BlockShape>& shapes) {
+  Places refined;
+  for (const BlockShape& shape : shapes) refined.insert(place_of(shape.origin, 1));
+  return refined;
+}
+
 /// Checks that the blocks of a level are where there is the level before. @param source  With the levels before.
 void check_level(const std::filesystem::path& path, const BlockSource& source, const std::vector<BlockShape>& shapes) {
   const std::size_t level = source.finer.size() + 1;
   const std::string name = "level " + std::to_string(level) + " of the field";
   if (shapes.empty()) fail(path, name + " has no active voxel");
-  const auto place_of = [](const Eigen::Vector3i& voxel, int doublings) {
-    const Eigen::Vector3i place = voxel.unaryExpr([&](int i) { return i >> (3 + doublings); });
-    return std::array<int, 3>{place.x(), place.y(), place.z()};
-  };
   const Eigen::AlignedBox3i voxels = active_box(source.shapes);  // A body may reach beyond, but not by a block.
   const Eigen::AlignedBox3i around(voxels.min().array() - TensorBlock::size, voxels.max().array() + TensorBlock::size);
-  std::set<std::array<int, 3>> refined;
-  for (std::size_t i = 0; level > 1 && i < source.finer.back().shapes.size(); ++i)
-    refined.insert(place_of(source.finer.back().shapes[i].origin, 1));
+  const Places refined = level > 1 ? refined_by(source.finer.back().shapes) : Places();
   for (const BlockShape& shape : shapes)
     if (level == 1 ? !around.contains(Eigen::Vector3i(shape.origin / 2))
                    : refined.count(place_of(shape.origin, 2)) == 0)
@@ -135,6 +143,7 @@ void check_level(const std::filesystem::path& path, const BlockSource& source, c
 /// Adds the finer levels of a field. @throw std::runtime_error if they do not fit to those before.
 void add_levels(const std::filesystem::path& path, const VdbFile& file, const FieldGrids& field, Derive derive,
                 BlockSource& source) {
+  std::size_t bricks = source.shapes.size();
   for (const std::vector<FieldPart>& parts : field.finer) {
     const std::vector<FieldGrid> grids = field_grids_of(file, parts);
     const std::size_t level = source.finer.size() + 1;
@@ -145,6 +154,8 @@ void add_levels(const std::filesystem::path& path, const VdbFile& file, const Fi
     const std::size_t bytes = derive != Derive::none ? sizeof(SampleBlock) : min_brick_bytes;
     std::vector<BlockShape> shapes = find_blocks(path, grids, bytes);
     check_level(path, source, shapes);
+    bricks += 8 * refined_by(shapes).size();
+    require_memory(path, bricks, cubic_brick_bytes);
     source.finer.push_back({std::move(shapes), fill_of(path, grids)});
   }
 }

@@ -227,6 +227,7 @@ std::vector<Eigen::Vector3i> bricks_near(const std::vector<Vector3d>& loads, con
   constexpr int edge = TensorBlock::size;
   std::vector<Eigen::Vector3i> bricks;
   for (const Vector3d& load : loads) {
+    if (!(box.cast<double>().exteriorDistance(load) < edge)) continue;
     const Eigen::Vector3i middle = (load / edge).array().floor().cast<int>();
     for (int n = 0; n < 27; ++n) {
       const Eigen::Vector3i brick = middle + Eigen::Vector3i(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
@@ -305,7 +306,9 @@ BlockSource generator_source(const Generator& generator, const GridSettings& gri
                           transform = to_world_of_level(to_world, level);
     const Eigen::AlignedBox3i voxels(2 * coarse.min(), 2 * coarse.max());
     const std::vector<Eigen::Vector3i> bricks = bricks_near(loads_of(checked, grid, before.inverse()), coarse);
-    result.finer.push_back({shapes_within(bricks, voxels), source_of_box(box, transform).fill});
+    if (bricks.empty()) break;  // The loads are far away.
+    const Eigen::AlignedBox3i any(Eigen::Vector3i::Zero(), Eigen::Vector3i::Zero());
+    result.finer.push_back({shapes_within(bricks, voxels), source_of_box(any, transform).fill});
     coarse = voxels;
   }
   result.name = kind_of(generator);

@@ -43,6 +43,7 @@ void TensorSampler::find_leaf(const Eigen::Vector3i& at, Eigen::Vector3i& cell, 
     brick_ = leaf.brick;
     first_ = Eigen::Map<const Eigen::Vector3f>(leaf.first.data()).cast<double>();
     scale_ = leaf.scale;
+    finest_ = std::max(finest_, scale_);
   }
   const Eigen::Vector3d local = (position - first_) * scale_;
   cell = local.cast<int>().cwiseMax(0).cwiseMin(TensorBrick::cells - 1);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -37,6 +38,9 @@ class TensorSampler {
   /// LeafBrick::scale of the brick that was sampled last.
   double scale() const { return scale_; }
 
+  /// The greatest one since the last call.
+  double take_finest_scale() { return std::exchange(finest_, scale_); }
+
  private:
   int locate(const Eigen::Vector3d& world, Eigen::Vector3d& fraction);
   void find_leaf(const Eigen::Vector3i& at, Eigen::Vector3i& cell, Eigen::Vector3d& fraction);
@@ -45,7 +49,7 @@ class TensorSampler {
   Eigen::Vector3i at_ = Eigen::Vector3i::Constant(INT32_MIN);  // Coordinates of `brick_`.
   TensorBrick brick_{};
   Eigen::Vector3d first_ = Eigen::Vector3d::Zero();  // LeafBrick::first, and its scale.
-  double scale_ = 1;
+  double scale_ = 1, finest_ = 1;
   std::uint64_t samples_ = 0;
 };
 

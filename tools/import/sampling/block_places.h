@@ -40,7 +40,6 @@ class BlockPlaces {
     return parent_extent_.isZero() ? dense(extent_, extent_.x(), 0, 0) : 8 * parents_.size();
   }
   const Eigen::Vector3i& extent() const { return extent_; }  ///< Blocks along each axis.
-  std::size_t refined() const { return parents_.size(); }    ///< Bricks of the level before.
 
   /// Number of the block at a place (index of its first voxel / 8) within the lattice; nothing if it is not sampled.
   std::optional<std::size_t> number(int x, int y, int z) const {

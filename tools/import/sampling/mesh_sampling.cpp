@@ -96,18 +96,16 @@ double volume_of(const TensorBlocks& blocks, const SamplingReport& report) {
 /// Peak and median are those of level 0; where a finer level has a greater norm, that is the peak.
 void report_sampled(const TensorGrid& grid, SamplingReport& report) {
   Norms norms;
-  const auto add = [&](const TensorBlocks& blocks) {
-    for (const TensorBlock& block : blocks)
-      for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset)
-        if (block.active[offset]) norms.push_back(block.values[offset].cast<double>().norm());
-  };
-  add(grid.blocks);
+  for (const TensorBlock& block : grid.blocks)
+    for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[offset]) norms.push_back(block.values[offset].cast<double>().norm());
   report.active = norms.size();
   report.volume = volume_of(grid.blocks, report);
   std::tie(report.sampled_peak, report.sampled_median) = peak_and_median(norms);
-  norms.clear();
-  for (const TensorBlocks& blocks : grid.finer) add(blocks);
-  report.sampled_peak = std::max(report.sampled_peak, peak_and_median(norms).first);
+  for (const TensorBlocks& blocks : grid.finer)
+    for (const TensorBlock& block : blocks)
+      for (const Eigen::Matrix3f& value : block.values)  // Zero where it is not active.
+        report.sampled_peak = std::max(report.sampled_peak, value.cast<double>().norm());
 }
 
 MeshSource on_lattice(const MeshSource& source, const SamplingLattice& lattice) {

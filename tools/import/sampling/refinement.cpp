@@ -191,7 +191,10 @@ std::vector<bool> bricks_to_refine(const SamplingLattice& lattice, const BlockPl
   const Vector3i last = places.extent() - Vector3i::Ones();
   for (const Eigen::AlignedBox3d& box : missed) {
     const Eigen::AlignedBox3i voxels = indices_of(lattice, box, margin);
-    const Vector3i from = voxels.min() / TensorBlock::size, to = (voxels.max() / TensorBlock::size).cwiseMin(last);
+    const Vector3i from = voxels.min() / TensorBlock::size;
+    Vector3i to = (voxels.max() / TensorBlock::size).cwiseMin(last);
+    for (int axis = 0; axis < 3; ++axis)  // The voxels of the lattice's last face have a block of their own.
+      if (TensorBlock::size * last[axis] == lattice.size[axis] - 1 && to[axis] == last[axis] - 1) ++to[axis];
     for (int x = from.x(); x <= to.x(); ++x)
       for (int y = from.y(); y <= to.y(); ++y)
         for (int z = from.z(); z <= to.z(); ++z)
