@@ -153,8 +153,8 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   result.exposure = 0;
   if (has_picture) result.view = picture_view(camera);
   if (colors.legend && (description.color.legend || output.wants(Annotation::legend)))
-    result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double) {
-      legend(image, matrix);
+    result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double exposure) {
+      legend(image, std::exp2(exposure) * matrix);
     };
   if (output.wants("tubes"))
     result.write_tubes = [tubes = std::move(shapes.tubes), colors](const std::filesystem::path& file,

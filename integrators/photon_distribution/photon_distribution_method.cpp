@@ -151,7 +151,6 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
  public:
   const char* name() const override { return "photon_distribution"; }
   bool shows_plate() const override { return true; }
-  std::string preferred_view() const override { return soft_highlights_view; }
 
   std::vector<Output> outputs() const override {
     return picture_outputs(

@@ -79,9 +79,6 @@ class Method {
   /// Whether `light.direction` has an effect on the picture.
   virtual bool needs_light_direction(const SceneDescription&) const { return true; }
 
-  /// The view of a display that suits its pictures, if the scene names none (ColorSettings::preferred_view).
-  virtual std::string preferred_view() const { return {}; }
-
   /// Whether the field bends its light: it has a scale then, and a direction in which it shows most.
   virtual bool bends_light() const { return true; }
 
