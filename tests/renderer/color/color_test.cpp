@@ -112,8 +112,8 @@ Image ramp_over(double wavelength, double peak, int size) {
   Image image(size, 1, {"R", "G", "B"});
   for (int i = 0; i < size; ++i) {
     const double at = 2.0 * i / (size - 1), white = std::max(0.0, at - 1);
-    const Eigen::Vector3d light =
-        at < 1 ? at * at * pure : (1 - white) * pure + Eigen::Vector3d::Constant(white * peak);
+    const double part = at < 1 ? at * at : 1 - white;
+    const Eigen::Vector3d light = part * pure + Eigen::Vector3d::Constant(white * peak);
     for (int c = 0; c < 3; ++c) image.pixel(i, 0)[c] = static_cast<float>(light[c]);
   }
   return image;
