@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include "base/constants.h"
 #include "integrators/polariscope/differences.h"
 #include "integrators/polariscope/turning.h"
@@ -14,9 +16,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::size_t packet_rays = 32;  // Rays that are sampled side by side.
-constexpr int most_threes = 5;           // A band has 3⁵ wavelengths at most.
-constexpr int most_sections = 10000;     // Of a ray in the body: a limit that no body reaches.
+constexpr int most_threes = 5;        // A band has 3⁵ wavelengths at most.
+constexpr int most_sections = 10000;  // Of a ray in the body: a limit that no body reaches.
 
 /// Middle of a step along its ray, from the plate, and its length.
 struct RayStep {
@@ -47,29 +48,22 @@ Section section_of(const Eigen::AlignedBox3d& box, const Vector3d& origin, const
 struct PolarTracer::Ray {
   Vector3d origin, index;  // On the plate, in world and in index space.
   std::vector<RayStep> steps;
-  TurningSteps turning;
   double phase = 0, length = 0;  // Σ √(a² + b²) h, at the reference; Σ h.
   bool is_lit = true;
-
-  /// Keeps its memory.
-  void restart(double greatest) {
-    steps.clear();
-    turning.steps.clear();
-    turning.greatest = greatest;
-    phase = length = 0;
-    is_lit = true;
-  }
 };
 
-/// Rays, and arrays for their tensors.
+/// Rays side by side, and the row's sums.
 struct PolarTracer::Packet {
-  std::vector<Ray> rays;
-  DifferenceSampler sampler;
-  std::vector<std::size_t> active;
-  std::vector<Vector3d> points;
-  std::vector<float> a, b, planes;
+  std::array<Ray, ray_lanes> rays;
+  RaySteps steps;
+  RayTurns turns;
+  std::vector<float> planes;
   std::vector<Eigen::Vector4d> means;  // By pixel, of quaternions w, x, y, z.
   std::vector<int> inside;             // By pixel: samples in the field.
+};
+
+struct PolarTracer::Samplers {
+  tbb::enumerable_thread_specific<DifferenceSampler> of_threads;
 };
 
 PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, const PolarizedLight& light,
@@ -80,7 +74,9 @@ PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, con
       plate_(plate),
       across_(field.to_index().linear() * light.direction),
       steps_per_length_(std::ldexp(across_.norm(), field.levels() - 1)),
-      room_(turning_room(light.bands.size())) {
+      room_(turning_room(light.bands.size())),
+      samplers_(new Samplers{tbb::enumerable_thread_specific<DifferenceSampler>(
+          [this] { return DifferenceSampler(field_, across_, light_.right, light_.up, light_.strength); })}) {
   for (const Band& band : light.bands)
     widest_ = std::max(widest_, std::abs(light.relative(band.wavelength + band.width / 2) -
                                          light.relative(band.wavelength - band.width / 2)));
@@ -97,6 +93,8 @@ PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, con
   }
 }
 
+PolarTracer::~PolarTracer() = default;
+
 const std::vector<std::vector<float>>& PolarTracer::wavelengths_for(double phase) const {
   std::size_t threes = 0;
   double change = 2 * phase * widest_;
@@ -107,6 +105,7 @@ const std::vector<std::vector<float>>& PolarTracer::wavelengths_for(double phase
 void PolarTracer::find_steps(Ray& ray) const {
   const Vector3d& k = light_.direction;
   const Vector3d from_start = ray.origin - light_.start;
+  ray.is_lit = true;
   if (light_.aperture) {
     ray.is_lit = light_.aperture->contains(Eigen::Vector2d(light_.aperture_axes * from_start));
     if (!ray.is_lit) return;
@@ -139,34 +138,38 @@ void PolarTracer::find_steps(Ray& ray) const {
   }
 }
 
-/// Sets the exponents of all steps of all rays: step by step, as neighbours are in the same brick.
+/// Sets the turns and phases of all rays, step by step.
 void PolarTracer::sample(Packet& packet) const {
+  DifferenceSampler& sampler = samplers_->of_threads.local();
+  RaySteps& steps = packet.steps;
   std::size_t most = 0;
-  for (const Ray& ray : packet.rays) most = std::max(most, ray.steps.size());
-  for (std::size_t step = 0; step < most; ++step) {
-    packet.active.clear();
-    for (std::size_t i = 0; i < packet.rays.size(); ++i)
-      if (step < packet.rays[i].steps.size()) packet.active.push_back(i);
-    const std::size_t count = packet.active.size();
-    packet.points.resize(2 * count);
-    for (std::size_t p = 0; p < 2 * count; ++p) {
-      const Ray& ray = packet.rays[packet.active[p % count]];
-      const RayStep& at = ray.steps[step];
-      packet.points[p] = ray.index + (at.middle + (p < count ? -gauss_point : gauss_point) * at.length) * across_;
-    }
-    packet.sampler.sample(packet.points, packet.a, packet.b);
-    for (std::size_t p = 0; p < count; ++p) {
-      Ray& ray = packet.rays[packet.active[p]];
-      const double h = ray.steps[step].length;
-      const double a1 = packet.a[p], b1 = packet.b[p], a2 = packet.a[count + p], b2 = packet.b[count + p];
-      ray.turning.add(h, a1, b1, a2, b2);
-      ray.phase += h * (std::sqrt(a1 * a1 + b1 * b1) + std::sqrt(a2 * a2 + b2 * b2)) / 2;
-    }
+  for (std::size_t i = 0; i < ray_lanes; ++i) {
+    most = std::max(most, packet.rays[i].steps.size());
+    for (int axis = 0; axis < 3; ++axis) steps.origin[axis][i] = packet.rays[i].index[axis];
   }
+  packet.turns.restart();
+  for (std::size_t step = 0; step < most; ++step) {
+    for (std::size_t i = 0; i < ray_lanes; ++i) {
+      const Ray& ray = packet.rays[i];
+      const RayStep at = step < ray.steps.size() ? ray.steps[step] : RayStep{0, 0};
+      steps.place[0][i] = at.middle - gauss_point * at.length;
+      steps.place[1][i] = at.middle + gauss_point * at.length;
+      steps.length[i] = static_cast<float>(at.length);
+    }
+    sampler.sample(steps);
+    packet.turns.add(steps.length, steps.a, steps.b);
+    for (std::size_t i = 0; i < ray_lanes; ++i)
+      packet.rays[i].phase += steps.length[i] *
+                              (std::sqrt(steps.a[0][i] * steps.a[0][i] + steps.b[0][i] * steps.b[0][i]) +
+                               std::sqrt(steps.a[1][i] * steps.a[1][i] + steps.b[1][i] * steps.b[1][i])) /
+                              2;
+  }
+  packet.turns.finish();
 }
 
 /// Adds a ray to the light of its pixel.
-void PolarTracer::add(const Ray& ray, float weight, std::size_t x, Packet& packet, LightRow& row) const {
+void PolarTracer::add(std::size_t lane, float weight, std::size_t x, Packet& packet, LightRow& row) const {
+  const Ray& ray = packet.rays[lane];
   if (!ray.is_lit) return;
   row.lit[x] += weight;
   float* const rotations = room_ > 0 ? &row.rotations[9 * room_ * x] : nullptr;
@@ -183,7 +186,7 @@ void PolarTracer::add(const Ray& ray, float weight, std::size_t x, Packet& packe
   packet.planes.resize(4 * room_);
   const auto& wavelengths = wavelengths_for(ray.phase);
   for (std::size_t i = 0; i < wavelengths.size(); ++i) {
-    turn(ray.turning, wavelengths[i].data(), room_, packet.planes.data());
+    turn(packet.turns.turns[lane], wavelengths[i].data(), room_, packet.planes.data());
     add_rotations(packet.planes.data(), weight / static_cast<float>(wavelengths.size()), room_, rotations);
     if (i == wavelengths.size() / 2)  // The middle of the band.
       for (std::size_t c = 0; c < 4; ++c)
@@ -198,27 +201,28 @@ LightRow PolarTracer::row(int y) const {
   row.rotations.resize(9 * room_ * width);
   row.lit.resize(width);
   row.points.resize(width);
-  Packet packet{{}, {field_, light_.right, light_.up, light_.strength}, {}, {}, {}, {}, {}, {}, {}};
+  Packet packet;
+  packet.turns.greatest = greatest_;
   packet.means.assign(width, Eigen::Vector4d::Zero());
   packet.inside.assign(width, 0);
-  for (std::size_t line = 0; line < n; ++line)
-    for (std::size_t begin = 0; begin < width * n; begin += packet_rays) {
-      const std::size_t end = std::min(begin + packet_rays, width * n);
-      packet.rays.resize(end - begin);
-      for (std::size_t i = begin; i < end; ++i) {
-        Ray& ray = packet.rays[i - begin];
-        ray.restart(greatest_);
-        ray.origin = plate_.to_world(
-            (Eigen::Vector2d(static_cast<double>(i), static_cast<double>(line)).array() + 0.5).matrix() /
-                light_.samples +
-            Eigen::Vector2d(0, y));
-        ray.index = field_.to_index() * ray.origin;
-        find_steps(ray);
-      }
-      sample(packet);
-      for (std::size_t i = begin; i < end; ++i)
-        add(packet.rays[i - begin], 1 / static_cast<float>(n * n), i / n, packet, row);
+  // Pixel by pixel, so that rays side by side are close to each other.
+  for (std::size_t begin = 0; begin < width * n * n; begin += ray_lanes) {
+    for (std::size_t i = 0; i < ray_lanes; ++i) {
+      const std::size_t pixel = (begin + i) / (n * n), sample = (begin + i) % (n * n);
+      Ray& ray = packet.rays[i];
+      ray.steps.clear();
+      ray.phase = ray.length = 0;
+      const Eigen::Array2d within(static_cast<double>(sample % n), static_cast<double>(sample / n));
+      const Eigen::Vector2d place =
+          ((within + 0.5) / light_.samples).matrix() + Eigen::Vector2d(static_cast<double>(pixel), y);
+      ray.origin = plate_.to_world(place);
+      ray.index = field_.to_index() * ray.origin;
+      if (pixel < width) find_steps(ray);
     }
+    sample(packet);
+    for (std::size_t i = 0; i < std::min<std::size_t>(ray_lanes, width * n * n - begin); ++i)
+      add(i, 1 / static_cast<float>(n * n), (begin + i) / (n * n), packet, row);
+  }
   for (std::size_t x = 0; x < width; ++x) {
     if (packet.inside[x] == 0) continue;
     PolarPoint& point = row.points[x];

@@ -5,6 +5,7 @@
 ///   a = u·T u − w·T w,   b = u·(T + Tᵀ) w,   dE/dz = −i (π C/λ) [[a, b], [b, −a]] E.
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -63,6 +64,7 @@ class PolarTracer {
  public:
   /// All must outlive it. @param geometry  Bounds, cut and obstacles.
   PolarTracer(const TensorField& field, const Geometry& geometry, const PolarizedLight& light, const Plate& plate);
+  ~PolarTracer();
 
   /// Any thread may call it. The result depends on the row alone.
   LightRow row(int y) const;
@@ -72,9 +74,10 @@ class PolarTracer {
  private:
   struct Ray;
   struct Packet;
+  struct Samplers;
   void find_steps(Ray& ray) const;
   void sample(Packet& packet) const;
-  void add(const Ray& ray, float weight, std::size_t x, Packet& packet, LightRow& row) const;
+  void add(std::size_t lane, float weight, std::size_t x, Packet& packet, LightRow& row) const;
   const std::vector<std::vector<float>>& wavelengths_for(double phase) const;
 
   const TensorField& field_;
@@ -84,6 +87,7 @@ class PolarTracer {
   Eigen::Vector3d across_;   // k in index space.
   double steps_per_length_;  // At least.
   std::size_t room_;
+  std::unique_ptr<Samplers> samplers_;                      // Of threads: bricks that are converted.
   double widest_ = 0;                                       // Change of the relative strength within a band, at most.
   double greatest_ = 0;                                     // Relative strength.
   std::vector<std::vector<std::vector<float>>> strengths_;  // By power of three; by wavelength of a band; by band.

@@ -198,17 +198,24 @@ TEST(Polariscope, StepsOfTurningAxesHaveFourthOrder) {
   constexpr double d = 9, turn_of_axes = 2.5;
   std::vector<double> errors;
   for (const int count : {4, 8, 16}) {
-    TurningSteps steps;
+    RayTurns turns;
     const double h = 1.0 / count;
     for (int i = 0; i < count; ++i) {
       const auto a = [&](double z) { return d / 2 * std::cos(2 * turn_of_axes * z); };
       const auto b = [&](double z) { return d / 2 * std::sin(2 * turn_of_axes * z); };
       const double z1 = (i + 0.5 - gauss_point) * h, z2 = (i + 0.5 + gauss_point) * h;
-      steps.add(h, a(z1), b(z1), a(z2), b(z2));
+      float lengths[ray_lanes], as[2][ray_lanes], bs[2][ray_lanes];
+      std::fill_n(lengths, ray_lanes, static_cast<float>(h));
+      for (const auto& [point, z] : {std::pair(0, z1), std::pair(1, z2)}) {
+        std::fill_n(as[point], ray_lanes, static_cast<float>(a(z)));
+        std::fill_n(bs[point], ray_lanes, static_cast<float>(b(z)));
+      }
+      turns.add(lengths, as, bs);
     }
+    turns.finish();
     const std::vector<float> strengths(turning_room(1), 1.0f);
     std::vector<float> q(4 * strengths.size());
-    turn(steps, strengths.data(), strengths.size(), q.data());
+    turn(turns.turns[3], strengths.data(), strengths.size(), q.data());
     const Quaterniond found(q[0], q[strengths.size()], q[2 * strengths.size()], q[3 * strengths.size()]);
     EXPECT_NEAR(found.norm(), 1, 1e-6);
     errors.push_back(distance(found, twisted(d, turn_of_axes)));
