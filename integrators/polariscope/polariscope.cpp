@@ -157,7 +157,7 @@ void PolarTracer::sample(Packet& packet) const {
       steps.length[i] = static_cast<float>(at.length);
     }
     sampler.sample(steps);
-    packet.turns.add(steps.length, steps.a, steps.b);
+    if (room_ > 0) packet.turns.add(steps.length, steps.a, steps.b);
     for (std::size_t i = 0; i < ray_lanes; ++i)
       packet.rays[i].phase += steps.length[i] *
                               (std::sqrt(steps.a[0][i] * steps.a[0][i] + steps.b[0][i] * steps.b[0][i]) +
