@@ -238,14 +238,40 @@ LightRow PolarTracer::row(int y) const {
   return row;
 }
 
-PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, std::size_t room)
-    : through_(room), by_rotation_(9 * room) {
+PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands,
+                     const std::vector<Vector3d>& colors)
+    : through_(turning_room(bands.size())), by_rotation_(9 * through_.size()), colors_(3 * through_.size()) {
+  const std::size_t room = through_.size();
   for (std::size_t k = 0; k < bands.size(); ++k) {
     const Analysis& analysis = analyses_.emplace_back(analysis_of(arrangement, bands[k].wavelength));
+    achromatic_ &= analysis.through == analyses_[0].through && analysis.by_rotation == analyses_[0].by_rotation;
     through_[k] = static_cast<float>(analysis.through);
     for (int i = 0; i < 9; ++i)
       by_rotation_[static_cast<std::size_t>(i) * room + k] = static_cast<float>(analysis.by_rotation(i / 3, i % 3));
+    for (int c = 0; c < 3; ++c) colors_[static_cast<std::size_t>(c) * room + k] = static_cast<float>(colors[k][c]);
   }
+}
+
+void PolarView::set_sums(LightRow& row) const {
+  row.sums.resize(27 * row.lit.size());
+  for (std::size_t x = 0; x < row.lit.size(); ++x)
+    sum_colors(row.of_pixel(x), 9, colors_.data(), row.room, &row.sums[27 * x]);
+}
+
+Eigen::Vector3f PolarView::color(const LightRow& row, std::size_t x) const {
+  const std::size_t room = row.room;
+  Eigen::Vector3f color;
+  if (!achromatic_) {
+    std::vector<float> powers(room);
+    this->powers(row, x, powers.data());
+    sum_colors(powers.data(), 1, colors_.data(), room, color.data());
+    return color;
+  }
+  sum_colors(through_.data(), 1, colors_.data(), room, color.data());
+  color *= row.lit[x];
+  for (std::size_t i = 0; i < 9; ++i)
+    color += by_rotation_[i * room] * Eigen::Map<const Eigen::Vector3f>(&row.sums[27 * x + 3 * i]);
+  return color;
 }
 
 void PolarView::powers(const LightRow& row, std::size_t x, float* powers) const {

@@ -53,6 +53,7 @@ struct LightRow {
   std::vector<float> rotations;  ///< Of a pixel, nine planes of `room` each: the mean rotation (elements.h) by bands.
   std::vector<float> lit;        ///< By pixels: the part of the light that nothing stops.
   std::vector<PolarPoint> points;
+  std::vector<float> sums;  ///< By pixels: of each of the nine planes, the sums of three colours (PolarView).
 
   const float* of_pixel(std::size_t x) const { return &rotations[9 * room * x]; }
 };
@@ -96,16 +97,25 @@ class PolarTracer {
 /// An arrangement's analyses of all bands, for many pixels.
 class PolarView {
  public:
-  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, std::size_t room);
+  /// @param colors  R, G and B of each band.
+  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, const std::vector<Eigen::Vector3d>& colors);
 
-  /// The power of each band (Analysis::power). @param powers  Has `room`.
+  std::size_t bands() const { return analyses_.size(); }
+
+  /// Whether the arrangement treats all bands alike, so that `sums` are enough for its colours.
+  bool is_achromatic() const { return achromatic_; }
+  void set_sums(LightRow& row) const;
+  Eigen::Vector3f color(const LightRow& row, std::size_t x) const;
+
+  /// The power of each band (Analysis::power). @param powers  Has room.
   void powers(const LightRow& row, std::size_t x, float* powers) const;
 
   Eigen::Vector4d stokes(const LightRow& row, std::size_t x, std::size_t band) const;
 
  private:
   std::vector<Analysis> analyses_;
-  std::vector<float> through_, by_rotation_;
+  bool achromatic_ = true;
+  std::vector<float> through_, by_rotation_, colors_;  // Planes.
 };
 
 }  // namespace tensorray

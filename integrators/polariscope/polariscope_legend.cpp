@@ -50,11 +50,10 @@ void draw_cross(Image& image, const Arrangement& arrangement) {
 std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const LoadedLightOfPolariscope& loaded,
                                                        const PolariscopeDescription& settings, double greatest) {
   std::vector<Analysis> analyses;
-  std::vector<Vector3d> colors;
+  const std::vector<Vector3d> colors = band_colors(scene);
   std::vector<double> relative;
   for (const Band& band : loaded.light.bands) {
     analyses.push_back(analysis_of(loaded.arrangement, band.wavelength));
-    colors.emplace_back(to_working(scene) * band.xyz);
     relative.push_back(loaded.light.relative(band.wavelength));
   }
   const auto* word = std::get_if<ArrangementWord>(&settings.arrangement);

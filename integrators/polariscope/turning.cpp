@@ -194,6 +194,17 @@ void add_all(const float* planes, float weight, std::size_t room, float* rotatio
   }
 }
 
+void sum_all(const float* rotations, std::size_t planes, const float* colors, std::size_t room, float* sums) {
+  const Floats d;
+  for (std::size_t plane = 0; plane < planes; ++plane)
+    for (std::size_t c = 0; c < 3; ++c) {
+      F sum = hn::Zero(d);
+      for (std::size_t at = 0; at < room; at += hn::Lanes(d))
+        sum = hn::MulAdd(hn::LoadU(d, rotations + plane * room + at), hn::LoadU(d, colors + c * room + at), sum);
+      sums[3 * plane + c] = hn::GetLane(hn::SumOfLanes(d, sum));
+    }
+}
+
 }  // namespace
 }  // namespace tensorray::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -204,6 +215,7 @@ namespace tensorray {
 HWY_EXPORT(add_steps);
 HWY_EXPORT(take_turns);
 HWY_EXPORT(add_all);
+HWY_EXPORT(sum_all);
 
 void RayTurns::restart() {
   open_ = {};
@@ -240,6 +252,10 @@ void turn(const std::vector<Turn>& turns, const float* strengths, std::size_t ro
 
 void add_rotations(const float* planes, float weight, std::size_t room, float* rotations) {
   HWY_DYNAMIC_DISPATCH(add_all)(planes, weight, room, rotations);
+}
+
+void sum_colors(const float* rotations, std::size_t planes, const float* colors, std::size_t room, float* sums) {
+  HWY_DYNAMIC_DISPATCH(sum_all)(rotations, planes, colors, room, sums);
 }
 
 }  // namespace tensorray

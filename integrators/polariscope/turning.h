@@ -60,4 +60,7 @@ void turn(const std::vector<Turn>& turns, const float* strengths, std::size_t ro
 /// Adds the rotations of quaternions, times `weight`: nine planes, row by row.
 void add_rotations(const float* planes, float weight, std::size_t room, float* rotations);
 
+/// The sums over wavelengths of `planes` planes times three colours, of which each has `room` numbers: sums[3 p + c].
+void sum_colors(const float* rotations, std::size_t planes, const float* colors, std::size_t room, float* sums);
+
 }  // namespace tensorray

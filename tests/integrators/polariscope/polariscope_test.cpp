@@ -307,7 +307,7 @@ double disc_error(int voxels) {
   const double orders = 3;                  // At the middle: σ₁ − σ₂ = 4/π.
   light.strength = pi * orders / (4 / pi);  // The slab is 1 thick.
   const Plate plate = plate_of(light, {150, 150}, 1.9);
-  const PolarView view(arrangement_of(ArrangementWord::circular), light.bands, turning_room(1));
+  const PolarView view(arrangement_of(ArrangementWord::circular), light.bands, {Vector3d::Ones()});
   double error = 0;
   for (int y = 0; y < 150; y += 7) {
     const LightRow row = row_of(field, light, plate, y);
