@@ -1,7 +1,6 @@
 #include "integrators/polariscope/differences.h"
 
 #include <algorithm>
-#include <array>
 
 #include "volumes/bricks/brick_layout.h"
 #include "volumes/sampling/tensor_sampler.h"
@@ -158,22 +157,16 @@ const float* DifferenceSampler::coefficients_of(const TensorBrick& brick) {
   if (found.of == brick.bending) return found.values.data();
   found.of = brick.bending;
   found.values.resize(2 * CubicBrick::coefficients);
-  // Component i, column by column, of T − T₂₂ I.
-  std::array<float, TensorBrick::general> a{}, b{};
-  for (int i = 0; i < TensorBrick::general; ++i) {
-    const int stored = TensorBrick::stored_component(brick.components, i);
-    a[static_cast<std::size_t>(stored)] += static_cast<float>(to_a_(i % 3, i / 3));
-    b[static_cast<std::size_t>(stored)] += static_cast<float>(to_b_(i % 3, i / 3));
-  }
-  const auto components = static_cast<std::size_t>(brick.components);
-  for (std::size_t k = 0; k < CubicBrick::coefficients; ++k) {
-    float sum_a = 0, sum_b = 0;
-    for (std::size_t c = 0; c < components; ++c) {
-      sum_a += a[c] * brick.bending[k * components + c];
-      sum_b += b[c] * brick.bending[k * components + c];
+  const Eigen::Matrix3f to_a = to_a_.cast<float>(), to_b = to_b_.cast<float>();
+  for (int k = 0; k < CubicBrick::coefficients; ++k) {
+    float* const to = found.values.data() + 2 * k;
+    to[0] = to[1] = 0;
+    for (int i = 0; i < TensorBrick::general; ++i) {  // Component i, column by column, of T − T₂₂ I.
+      const int stored = TensorBrick::stored_component(brick.components, i);
+      const float value = brick.bending[CubicBrick::bending_offset(brick.components, k) + stored];
+      to[0] += to_a.data()[i] * value;
+      to[1] += to_b.data()[i] * value;
     }
-    found.values[2 * k] = sum_a;
-    found.values[2 * k + 1] = sum_b;
   }
   return found.values.data();
 }

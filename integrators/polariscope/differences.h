@@ -3,7 +3,6 @@
 /// a = u·T u − w·T w and b = u·(T + Tᵀ) w at the Gauss points of steps. These two are linear in T: the coefficients of
 /// a brick become those of a and b. Rays side by side are mostly in one cell, whose coefficients are loaded once.
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -13,14 +12,6 @@
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
-
-/// Steps of parallel rays, one of each ray.
-struct RaySteps {
-  double origin[3][ray_lanes];             ///< Of the rays, index space.
-  double place[2][ray_lanes];              ///< The step's Gauss points, along the ray from its origin.
-  float length[ray_lanes];                 ///< 0: the ray has no step.
-  float a[2][ray_lanes], b[2][ray_lanes];  ///< What is found at the points.
-};
 
 /// One thread's. It keeps the bricks that it converted last.
 class DifferenceSampler {
@@ -33,10 +24,11 @@ class DifferenceSampler {
   /// on earlier calls.
   void sample(RaySteps& steps);
 
-  /// Of a cell of the finest voxels: the first of the 4³ coefficients that are in use there, and where it is in theirs.
+  /// Of a cell of the finest voxels: the first of the 4³ coefficients that are in use there; null: they are 0. A
+  /// fraction of the cell, times `scale` plus `offset`, is one of the coefficients' cell.
   struct Cell {
-    const float* first;      ///< a and b; null: they are 0.
-    float scale, offset[3];  ///< A fraction of the cell, times `scale` plus `offset`, is one of the coefficients' cell.
+    const float* first;
+    float scale, offset[3];
   };
   Cell find(const std::int32_t (&cell)[3]);
 

@@ -24,23 +24,17 @@ struct RayStep {
   double middle, length;
 };
 
-/// From where to where a ray is in a box.
-struct Section {
-  double begin, end;
-};
-
-Section section_of(const Eigen::AlignedBox3d& box, const Vector3d& origin, const Vector3d& along) {
-  Section section{-std::numeric_limits<double>::infinity(), 0};  // The plate is at 0.
+/// From where to where a ray is in a box; the plate is at 0.
+std::pair<double, double> section_of(const Eigen::AlignedBox3d& box, const Vector3d& origin, const Vector3d& along) {
+  double begin = -std::numeric_limits<double>::infinity(), end = 0;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = box.min()[axis] - origin[axis], high = box.max()[axis] - origin[axis];
-    if (along[axis] == 0) {
-      if (low > 0 || high < 0) section.end = section.begin;
-      continue;
-    }
-    section.begin = std::max(section.begin, std::min(low / along[axis], high / along[axis]));
-    section.end = std::min(section.end, std::max(low / along[axis], high / along[axis]));
+    if (along[axis] == 0 && (low > 0 || high < 0)) return {0, 0};
+    if (along[axis] == 0) continue;
+    begin = std::max(begin, std::min(low / along[axis], high / along[axis]));
+    end = std::min(end, std::max(low / along[axis], high / along[axis]));
   }
-  return section;
+  return {begin, end};
 }
 
 }  // namespace
@@ -52,18 +46,22 @@ struct PolarTracer::Ray {
   bool is_lit = true;
 };
 
-/// Rays side by side, and the row's sums.
+/// Rays side by side.
 struct PolarTracer::Packet {
   std::array<Ray, ray_lanes> rays;
   RaySteps steps;
-  RayTurns turns;
+  std::vector<RayTurns> turns;
   std::vector<float> planes;
-  std::vector<Eigen::Vector4d> means;  // By pixel, of quaternions w, x, y, z.
-  std::vector<int> inside;             // By pixel: samples in the field.
+  /// Of each pixel: quaternions w, x, y, z; samples in the field.
+  struct Sum {
+    Eigen::Vector4d mean = Eigen::Vector4d::Zero();
+    int inside = 0;
+  };
+  std::vector<Sum> sums;
 };
 
-struct PolarTracer::Samplers {
-  tbb::enumerable_thread_specific<DifferenceSampler> of_threads;
+struct PolarTracer::Samplers : tbb::enumerable_thread_specific<DifferenceSampler> {
+  using enumerable_thread_specific::enumerable_thread_specific;
 };
 
 PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, const PolarizedLight& light,
@@ -75,8 +73,8 @@ PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, con
       across_(field.to_index().linear() * light.direction),
       steps_per_length_(std::ldexp(across_.norm(), field.levels() - 1)),
       room_(turning_room(light.bands.size())),
-      samplers_(new Samplers{tbb::enumerable_thread_specific<DifferenceSampler>(
-          [this] { return DifferenceSampler(field_, across_, light_.right, light_.up, light_.strength); })}) {
+      samplers_(std::make_unique<Samplers>(
+          [this] { return DifferenceSampler(field_, across_, light_.right, light_.up, light_.strength); })) {
   for (const Band& band : light.bands)
     widest_ = std::max(widest_, std::abs(light.relative(band.wavelength + band.width / 2) -
                                          light.relative(band.wavelength - band.width / 2)));
@@ -106,31 +104,27 @@ void PolarTracer::find_steps(Ray& ray) const {
   const Vector3d& k = light_.direction;
   const Vector3d from_start = ray.origin - light_.start;
   ray.is_lit = true;
-  if (light_.aperture) {
-    ray.is_lit = light_.aperture->contains(Eigen::Vector2d(light_.aperture_axes * from_start));
-    if (!ray.is_lit) return;
-  }
-  if (!geometry_.surfaces().obstacles.empty()) {
+  if (light_.aperture) ray.is_lit = light_.aperture->contains(Eigen::Vector2d(light_.aperture_axes * from_start));
+  if (ray.is_lit && !geometry_.surfaces().obstacles.empty()) {
     const double way = from_start.dot(k);
     const auto hit = geometry_.absorber(ray.origin - way * k, k, way);
     ray.is_lit = !hit || hit->surface != Surface::obstacle;
-    if (!ray.is_lit) return;
   }
-  const Section box = section_of(field_.index_bounds(), ray.index, across_);
-  const auto add_steps = [&](double begin, double end) {
-    if (!(end > begin)) return;
-    const double count = std::max(1.0, std::ceil((end - begin) * steps_per_length_ - 1e-6));
-    const double length = (end - begin) / count;
-    for (int i = 0; i < count; ++i) ray.steps.push_back({begin + (i + 0.5) * length, length});
-    ray.length += end - begin;
+  if (!ray.is_lit) return;
+  const auto [begin, end] = section_of(field_.index_bounds(), ray.index, across_);
+  if (!(end > begin)) return;
+  const auto add_steps = [&](double from, double to) {
+    if (!(to > from)) return;
+    const double count = std::max(1.0, std::ceil((to - from) * steps_per_length_ - 1e-6)), length = (to - from) / count;
+    for (int i = 0; i < count; ++i) ray.steps.push_back({from + (i + 0.5) * length, length});
+    ray.length += to - from;
   };
-  if (!(box.end > box.begin)) return;
-  if (!geometry_.has_cut()) return add_steps(box.begin, box.end);
-  double at = box.begin;
+  if (!geometry_.has_cut()) return add_steps(begin, end);
+  double at = begin;
   bool is_inside = geometry_.inside_cut(ray.origin + at * k, k);
   for (int i = 0; i < most_sections; ++i) {
-    const auto hit = geometry_.crossing(Surface::cut, !is_inside, ray.origin + at * k, k, box.end - at);
-    const double next = hit ? at + hit->distance : box.end;
+    const auto hit = geometry_.crossing(Surface::cut, !is_inside, ray.origin + at * k, k, end - at);
+    const double next = hit ? at + hit->distance : end;
     if (is_inside) add_steps(at, next);
     if (!hit) return;
     is_inside = !is_inside;
@@ -138,16 +132,16 @@ void PolarTracer::find_steps(Ray& ray) const {
   }
 }
 
-/// Sets the turns and phases of all rays, step by step.
+/// Finds the turns and phases of all rays, step by step.
 void PolarTracer::sample(Packet& packet) const {
-  DifferenceSampler& sampler = samplers_->of_threads.local();
+  DifferenceSampler& sampler = samplers_->local();
   RaySteps& steps = packet.steps;
   std::size_t most = 0;
   for (std::size_t i = 0; i < ray_lanes; ++i) {
     most = std::max(most, packet.rays[i].steps.size());
     for (int axis = 0; axis < 3; ++axis) steps.origin[axis][i] = packet.rays[i].index[axis];
   }
-  packet.turns.restart();
+  packet.turns.clear();
   for (std::size_t step = 0; step < most; ++step) {
     for (std::size_t i = 0; i < ray_lanes; ++i) {
       const Ray& ray = packet.rays[i];
@@ -157,14 +151,13 @@ void PolarTracer::sample(Packet& packet) const {
       steps.length[i] = static_cast<float>(at.length);
     }
     sampler.sample(steps);
-    if (room_ > 0) packet.turns.add(steps.length, steps.a, steps.b);
-    for (std::size_t i = 0; i < ray_lanes; ++i)
-      packet.rays[i].phase += steps.length[i] *
-                              (std::sqrt(steps.a[0][i] * steps.a[0][i] + steps.b[0][i] * steps.b[0][i]) +
-                               std::sqrt(steps.a[1][i] * steps.a[1][i] + steps.b[1][i] * steps.b[1][i])) /
-                              2;
+    if (room_ > 0) add_steps(steps, greatest_, packet.turns);
+    for (const int point : {0, 1})
+      for (std::size_t i = 0; i < ray_lanes; ++i) {
+        const float a = steps.a[point][i], b = steps.b[point][i];
+        packet.rays[i].phase += steps.length[i] * std::sqrt(a * a + b * b) / 2;
+      }
   }
-  packet.turns.finish();
 }
 
 /// Adds a ray to the light of its pixel.
@@ -181,16 +174,16 @@ void PolarTracer::add(std::size_t lane, float weight, std::size_t x, Packet& pac
   PolarPoint& point = row.points[x];
   point.integral += static_cast<float>(2 * ray.phase);
   point.length += static_cast<float>(ray.length);
-  ++packet.inside[x];
+  ++packet.sums[x].inside;
   if (room_ == 0) return;
   packet.planes.resize(4 * room_);
   const auto& wavelengths = wavelengths_for(ray.phase);
   for (std::size_t i = 0; i < wavelengths.size(); ++i) {
-    turn(packet.turns.turns[lane], wavelengths[i].data(), room_, packet.planes.data());
+    turn(packet.turns, lane, wavelengths[i].data(), room_, packet.planes.data());
     add_rotations(packet.planes.data(), weight / static_cast<float>(wavelengths.size()), room_, rotations);
     if (i == wavelengths.size() / 2)  // The middle of the band.
       for (std::size_t c = 0; c < 4; ++c)
-        packet.means[x][static_cast<int>(c)] += packet.planes[c * room_ + light_.reference];
+        packet.sums[x].mean[static_cast<int>(c)] += packet.planes[c * room_ + light_.reference];
   }
 }
 
@@ -202,9 +195,7 @@ LightRow PolarTracer::row(int y) const {
   row.lit.resize(width);
   row.points.resize(width);
   Packet packet;
-  packet.turns.greatest = greatest_;
-  packet.means.assign(width, Eigen::Vector4d::Zero());
-  packet.inside.assign(width, 0);
+  packet.sums.resize(width);
   // Pixel by pixel, so that rays side by side are close to each other.
   for (std::size_t begin = 0; begin < width * n * n; begin += ray_lanes) {
     for (std::size_t i = 0; i < ray_lanes; ++i) {
@@ -212,10 +203,8 @@ LightRow PolarTracer::row(int y) const {
       Ray& ray = packet.rays[i];
       ray.steps.clear();
       ray.phase = ray.length = 0;
-      const Eigen::Array2d within(static_cast<double>(sample % n), static_cast<double>(sample / n));
-      const Eigen::Vector2d place =
-          ((within + 0.5) / light_.samples).matrix() + Eigen::Vector2d(static_cast<double>(pixel), y);
-      ray.origin = plate_.to_world(place);
+      const auto place = [&](std::size_t step) { return (static_cast<double>(step) + 0.5) / light_.samples; };
+      ray.origin = plate_.to_world({static_cast<double>(pixel) + place(sample % n), y + place(sample / n)});
       ray.index = field_.to_index() * ray.origin;
       if (pixel < width) find_steps(ray);
     }
@@ -224,12 +213,13 @@ LightRow PolarTracer::row(int y) const {
       add(i, 1 / static_cast<float>(n * n), (begin + i) / (n * n), packet, row);
   }
   for (std::size_t x = 0; x < width; ++x) {
-    if (packet.inside[x] == 0) continue;
+    const auto inside = static_cast<float>(packet.sums[x].inside);
+    if (inside == 0) continue;
     PolarPoint& point = row.points[x];
-    point.integral /= static_cast<float>(packet.inside[x]);
-    point.length /= static_cast<float>(packet.inside[x]);
+    point.integral /= inside;
+    point.length /= inside;
     // The mean of unitary matrices is that of the middle, as they are smooth.
-    const Eigen::Vector4d mean = packet.means[x].normalized();
+    const Eigen::Vector4d mean = packet.sums[x].mean.normalized();
     const EquivalentRetarder retarder = equivalent_retarder({mean[0], mean[1], mean[2], mean[3]});
     point.phase = static_cast<float>(retarder.phase);
     point.azimuth = static_cast<float>(retarder.azimuth);

@@ -138,7 +138,8 @@ std::string LoadedPolariscope::traced_key(const Scene& scene) const {
     std::error_code none;
     files += fmt::format(" {}", std::filesystem::last_write_time(input.path, none).time_since_epoch().count());
   }
-  for (const Eigen::Vector3d& color : band_colors(scene)) files += fmt::format(" {} {} {}", color[0], color[1], color[2]);
+  for (const Eigen::Vector3d& color : band_colors(scene))
+    files += fmt::format(" {} {} {}", color[0], color[1], color[2]);
   const Eigen::Vector3d& V = loaded_.light.direction;
   return json.dump() + files + fmt::format(" {} {} {} {}", V.x(), V.y(), V.z(), loaded_.stress_optic);
 }
