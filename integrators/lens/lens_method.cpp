@@ -262,6 +262,8 @@ class LensMethod : public MethodWith<LensDescription> {
   const char* name() const override { return "lens"; }
   bool shows_plate() const override { return true; }
 
+  std::vector<std::string> channels(const SceneDescription&) const override { return channel_names(lens_channels()); }
+
   std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
 
   std::vector<NamedFile> inputs() const override {

@@ -138,7 +138,7 @@ std::size_t bytes_per_pixel(const SceneDescription& scene, PhotonDensityKind kin
   const auto channels = static_cast<std::size_t>(channel_count(scene));
   const std::size_t linear = 3 * sizeof(float);
   if (kind == PhotonDensityKind::mesh) {
-    const std::size_t map = plate_map_channels() * sizeof(float);
+    const std::size_t map = plate_map_channels().size() * sizeof(float);
     return 3 * sizeof(double) + linear + (scene.output.wants("exr") ? linear + 2 * map : 0) +
            (is_spectral ? channels * (sizeof(double) + sizeof(float)) : 0);
   }
@@ -152,6 +152,10 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
   const char* name() const override { return "photon_distribution"; }
   bool shows_plate() const override { return true; }
   std::string preferred_view() const override { return soft_highlights_view; }
+
+  std::vector<std::string> channels(const SceneDescription&) const override {
+    return settings().density.kind == PhotonDensityKind::mesh ? plate_map_channels() : std::vector<std::string>();
+  }
 
   std::vector<Output> outputs() const override {
     return picture_outputs(

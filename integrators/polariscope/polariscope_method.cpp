@@ -242,6 +242,10 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
   bool shows_plate() const override { return true; }
   bool bends_light() const override { return false; }
 
+  std::vector<std::string> channels(const SceneDescription&) const override {
+    return channel_names(polariscope_channels());
+  }
+
   std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
 
   std::vector<NamedFile> inputs() const override {

@@ -32,10 +32,32 @@ void write_display(const std::filesystem::path& file, const Scene& scene, const 
   write_image(file, display_image(scene, render, holds_alpha(file)), metadata);
 }
 
+/// The picture as its EXR has it.
+Image exr_of(const Image& linear, const OutputDescription& output) {
+  std::vector<std::size_t> kept;
+  std::vector<std::string> names;
+  for (std::size_t c = 0; c < linear.channels.size(); ++c) {
+    const std::string layer = layer_of(linear.channels[c]);
+    const auto is_layer = [&](const std::string& wanted) { return wanted == layer; };
+    if (output.exr_layers && !layer.empty() &&
+        std::none_of(output.exr_layers->begin(), output.exr_layers->end(), is_layer))
+      continue;
+    kept.push_back(c);
+    names.push_back(linear.channels[c]);
+  }
+  Image image(linear.width, linear.height, names);
+  image.has_half_colors = output.exr_type == ExrType::half;
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = linear.pixels[i / kept.size() * linear.channels.size() + kept[i % kept.size()]];
+  return image;
+}
+
 void write_linear(const std::filesystem::path& file, const Scene& scene, const Render& render) {
   ImageMetadata metadata = provenance(scene, render);
   metadata["chromaticities"] = fmt::format("{}", fmt::join(scene.color.working_chromaticities(), " "));
-  write_image(file, render.linear, metadata);
+  const OutputDescription& output = scene.description.output;
+  if (!output.exr_layers && output.exr_type == ExrType::single) return write_image(file, render.linear, metadata);
+  write_image(file, exr_of(render.linear, output), metadata);
 }
 
 void write_spectral(const std::filesystem::path& file, const Scene& scene, const Render& render) {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -12,6 +13,7 @@
 #include "renderer/meshes/mesh.h"
 #include "scenes/description/choices.h"
 #include "scenes/scene/scene.h"
+#include "scenes/scene/turning.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/making/field_making.h"
 #include "volumes/making/smoothing.h"
@@ -36,7 +38,10 @@ BlockSource open_field(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
   if (!field.generate && has_number_sign(field.file.filename().string()) && !std::filesystem::exists(field.file))
     throw SceneError(field.file.string() + ": # is for the number of a frame: give --frames");
-  if (!field.generate) return open_tensor_vdb(field.file, field.name, field.derive, field.components);
+  if (!field.generate) {
+    BlockSource blocks = open_tensor_vdb(field.file, field.name, field.derive, field.components);
+    return scene.world.up == UpAxis::z ? blocks : turned(std::move(blocks), scene.turn());
+  }
   try {
     require_memory_for(field.generate->grid, 65);  // With the bricks.
     return generator_source(field.generate->generator, field.generate->grid);
@@ -65,8 +70,8 @@ LoadedField load_field(const SceneDescription& scene, const Progress& progress) 
       key, [&] { return prepare_field(open_field(scene), choices_of(scene), source_of(scene)); }, progress);
 }
 
-TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
-  TriangleMesh mesh = read_mesh(path);
+TriangleMesh load_closed_mesh(const SceneDescription& scene, const std::filesystem::path& path) {
+  TriangleMesh mesh = read_mesh(path, scene.turn());
   try {
     require_closed(mesh);
   } catch (const std::invalid_argument& error) {
@@ -218,7 +223,7 @@ Surfaces load_volume(const SceneDescription& description, const TensorField& fie
   Surfaces surfaces;
   surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
   if (const auto* mesh = std::get_if<std::filesystem::path>(&description.field.bounds))
-    surfaces.cut = load_closed_mesh(*mesh);
+    surfaces.cut = load_closed_mesh(description, *mesh);
   else if (ends_at_surface(description, field))
     surfaces.cut = closed_surface(field.surface(), source_of(description));
   return surfaces;
@@ -227,7 +232,8 @@ Surfaces load_volume(const SceneDescription& description, const TensorField& fie
 /// Loads the volume, the obstacles and the plate. Moves the start of `beam` before all of them.
 Surfaces load_surfaces(const SceneDescription& description, const TensorField& field, Beam& beam) {
   Surfaces surfaces = load_volume(description, field);
-  for (const std::filesystem::path& path : description.obstacles) surfaces.obstacles.push_back(read_mesh(path));
+  for (const std::filesystem::path& path : description.obstacles)
+    surfaces.obstacles.push_back(read_mesh(path, description.turn()));
   surfaces.plate = make_plate(description, field, beam);
   require_near(beam, description, field);
   require_near(*surfaces.plate, "/receiver", description, field);
@@ -253,8 +259,15 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
   if (!description.integrator.method().bends_light()) return AutoScale{given.value_or(1)};
   const Geometry volume({geometry.surfaces().bounds, geometry.surfaces().cut, std::nullopt, {}});
   const Beam light = silhouette_beam(field.corners(), beam.direction, beam.up);
-  const AutoScale scale = given ? judge_scale(field, volume, light, *given, flexibility, progress)
-                                : choose_scale(field, volume, light, progress);
+  AutoScale scale = given ? judge_scale(field, volume, light, *given, flexibility, progress)
+                          : choose_scale(field, volume, light, progress);
+  const auto view = description.integrator.method().view_through(description, field.world_box().center());
+  if (!given && view && view->norm() > 0) {  // Both what light shows and what is seen: the mean of their scales.
+    const Beam seen = silhouette_beam(field.corners(), *view, beam.up);
+    const AutoScale by_view = choose_scale(field, volume, seen, progress);
+    const double mean = scale.shown > 0 ? std::sqrt(scale.scale * by_view.scale) : by_view.scale;
+    if (by_view.shown > 0) scale = judge_scale(field, volume, light, mean, probe_flexibility, progress);
+  }
   if (scale.greatest_turn == 0) {
     notes.push_back(
         fmt::format("warning: no probe ray is turned (the field is zero or isotropic, or light travels along its "
@@ -461,6 +474,7 @@ std::string field_key(const SceneDescription& description) {
   }
   const FieldChoices choices = choices_of(description);
   return nlohmann::json{field,
+                        description.world.up,
                         identity_of(description.field.file),
                         choices.interpolant.between,
                         choices.interpolant.border,

@@ -154,7 +154,7 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
   load(with(options, {"light.direction=[0,0,-1]"}));
   const std::vector<Eigen::Vector3d> directions = directions_of(*scene, progress);
   for (std::size_t column = 0; column < columns; ++column) {
-    const Eigen::Vector3d& V = directions[column];
+    const Eigen::Vector3d V = scene->description.turn().transpose() * directions[column];
     const std::string direction = fmt::format("light.direction=[{},{},{}]", V.x(), V.y(), V.z());
     load(with(options, {direction}));
     const Strength strength = scene->method->strength(*scene);

@@ -63,7 +63,7 @@ std::string run_statistics(const Scene& scene, const Statistics& statistics, dou
 std::string scene_as_rendered(const Scene& scene) {
   auto json = parse_value(scene.description.text);
   json["field"]["scale"] = scene.scale.scale;
-  const Eigen::Vector3d& V = *scene.description.light.direction;
+  const Eigen::Vector3d V = scene.description.turn().transpose() * *scene.description.light.direction;
   if (json.contains("light") && json["light"].value("direction", Json()) == "auto")
     json["light"]["direction"] = {V.x(), V.y(), V.z()};
   return json.dump(2) + "\n";
