@@ -262,7 +262,7 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
   bool shows_plate() const override { return true; }
   bool bends_light() const override { return false; }
 
-  std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
+  std::vector<Output> outputs() const override { return picture_outputs({spectral_output(), maps_output()}); }
 
   std::vector<NamedFile> inputs() const override {
     const auto* file = std::get_if<std::filesystem::path>(&settings().stress_optic);
