@@ -234,7 +234,7 @@ void print_text(const InfoOptions& options, const std::vector<GridInfo>& grids, 
 
 void info(InfoOptions options) {
   const Threads threads;
-  const std::optional<ImportedField> imported = import_field(options.files, options.import, false);
+  const std::optional<ImportedField> imported = import_field(options.files, options.import, options.json);
   options.field_file = imported ? imported->path() : options.files.front();
   if (!imported) {
     std::signal(SIGINT, SIG_DFL);  // This command writes no file, so Ctrl-C may end it at once.
