@@ -264,7 +264,7 @@ class LensMethod : public MethodWith<LensDescription> {
 
   std::vector<std::string> channels(const SceneDescription&) const override { return channel_names(lens_channels()); }
 
-  std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
+  std::vector<Output> outputs() const override { return picture_outputs({spectral_output(), maps_output()}); }
 
   std::vector<NamedFile> inputs() const override {
     const auto* file = std::get_if<std::filesystem::path>(&settings().image);

@@ -159,6 +159,10 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   PathShapes shapes = make_shapes(scene, paths_, result.paths, colors, camera);
   result.exposure = 0;
   if (has_picture) result.view = picture_view(camera);
+  if (has_picture && output.default_annotations && !result.view->pixel_size) {
+    result.view->pixel_size = pixel_size(camera, camera.position + camera.focus_distance * camera.forward);
+    result.notes.push_back("the scale bar is that of the middle of the scene, as the camera is in perspective");
+  }
   if (colors.legend && (description.color.legend || output.wants(Annotation::legend)))
     result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double) {
       legend(image, matrix);
@@ -241,6 +245,10 @@ void PathTracingMethod::check(SceneDescription& scene, const Json& json, const S
   if (paths.radius.min && paths.radius.max && *paths.radius.min > *paths.radius.max)
     source.fail("`/integrator/radius`: `min` must not exceed `max`");
   if (!chosen) return;
+  if (!given(json, "/output/annotations")) {
+    scene.output.annotations = {Annotation::scale, Annotation::legend};
+    scene.output.default_annotations = true;
+  }
   if (scene.bending.settings.max_steps > 1'000'000)
     source.fail("`/bending/max_steps` must be at most 1e6 with path_tracing, which keeps every step of a path");
   check_memory(scene.camera.resolution.cast<double>().prod() *

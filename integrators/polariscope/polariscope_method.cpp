@@ -246,7 +246,7 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
     return channel_names(polariscope_channels());
   }
 
-  std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
+  std::vector<Output> outputs() const override { return picture_outputs({spectral_output(), maps_output()}); }
 
   std::vector<NamedFile> inputs() const override {
     const auto* file = std::get_if<std::filesystem::path>(&settings().stress_optic);

@@ -89,6 +89,7 @@ struct FieldDescription {
   Derive derive = Derive::none;
   ComponentGrids components;  ///< The grids that are the field's components; empty: found by their names.
   double smooth = 0;          ///< Deviation of the Gaussian that smooths the field, voxels; 0: none.
+  bool noise = false;         ///< Whether the field is replaced by its noise alone (keep_noise).
   Eigenvalues eigenvalues = Eigenvalues::automatic;
   Interpolation interpolation = Interpolation::cubic;
   BorderChoice border = BorderChoice::automatic;
@@ -230,7 +231,8 @@ struct OutputDescription {
   std::string ocio;           ///< OCIO config, as of ColorSettings; empty: $OCIO, or the built-in one.
   std::string display, view;  ///< Empty: the default of the config.
   std::vector<Annotation> annotations;
-  std::string caption;  ///< A line that is drawn over `image`; with the values of keys.
+  bool default_annotations = false;  ///< The method has chosen them: where one has no meaning, it is left out.
+  std::string caption;               ///< A line that is drawn over `image`; with the values of keys.
 
   bool wants(const std::string& key) const { return files.count(key) > 0; }
   bool wants(Annotation annotation) const {
@@ -263,6 +265,7 @@ struct SceneDescription {
   bool default_objects = true;  ///< No `objects` are given: there is a floor.
   OutputDescription output;
   std::vector<std::string> warnings;  ///< Likely mistakes that are allowed; one line each.
+  bool judges_scale = true;           ///< Whether notes say how much a given scale shows, which takes probe rays.
 
   /// From the axes of the scene and its files to those of the program, in which z is up. Positions and directions in
   /// this struct are turned already.

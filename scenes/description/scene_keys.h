@@ -37,6 +37,7 @@ inline void describe(FieldDescription& field, KeyVisitor& visit) {
   visit.exclude("components", {"generate"});
   visit("smooth", field.smooth, "standard deviation of a Gaussian that smooths the field first, voxels; 0 is none",
         between(0, max_smoothing));
+  visit("noise", field.noise, "replace the field by its noise alone, without structure, for a picture beside its own");
   visit("eigenvalues", field.eigenvalues,
         "raw: as they are; absolute: |T|; positive: (T^2)^(1/2); auto: absolute if the field is symmetric, else raw",
         knob());

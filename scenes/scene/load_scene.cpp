@@ -16,6 +16,7 @@
 #include "scenes/scene/turning.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/making/field_making.h"
+#include "volumes/making/noise.h"
 #include "volumes/making/smoothing.h"
 
 namespace tensorray {
@@ -32,6 +33,7 @@ constexpr int most_resolution = 2048;     // ... are not more than this.
 constexpr double narrowest_plate = 0.25;  // Its shorter side, as a part of the longer one, where the size is not given.
 constexpr double visible = 0.02;          // AutoScale::shown; a picture that shows less looks empty.
 constexpr double much_less = 0.5;         // Of the best AutoScale::shown: reason to name that scale.
+constexpr double erased = 0.5;            // Of a field's variation: less is left where smoothing erases structure.
 constexpr double much = 1;                // AutoScale::median_turn, radians.
 
 BlockSource open_field(const SceneDescription& scene) {
@@ -256,7 +258,8 @@ std::string advice_on(const AutoScale& given, const AutoScale& best) {
 AutoScale load_scale(const SceneDescription& description, const TensorField& field, const Geometry& geometry,
                      const Beam& beam, double flexibility, const Progress& progress, std::vector<std::string>& notes) {
   const std::optional<double>& given = description.field.scale;
-  if (!description.integrator.method().bends_light()) return AutoScale{given.value_or(1)};
+  if (!description.integrator.method().bends_light() || (given && !description.judges_scale))
+    return AutoScale{given.value_or(1)};
   const Geometry volume({geometry.surfaces().bounds, geometry.surfaces().cut, std::nullopt, {}});
   const Beam light = silhouette_beam(field.corners(), beam.direction, beam.up);
   AutoScale scale = given ? judge_scale(field, volume, light, *given, flexibility, progress)
@@ -356,9 +359,9 @@ LoadedField with_notes(MadeField made, const std::string& source) {
         source, beyond));
   if (is_coarse(made.resolution))
     notes.push_back(fmt::format(
-        "warning: {}: voxels are too coarse: linear and cubic interpolation differ by {:.0f}% of the field's "
-        "norm in one of 100 cells; sample the field more finely, or smooth it",
-        source, 100 * made.resolution.percentile_99));
+        "warning: {}: voxels are too coarse, or have noise: linear and cubic interpolation differ by {:.0f}% of the "
+        "field's norm in one of 10 cells, {:.0f}% in one of 100; sample the field more finely, or smooth it",
+        source, 100 * made.resolution.percentile_90, 100 * made.resolution.percentile_99));
   if (eigenvalues.defective > 0)
     notes.push_back(fmt::format("{} voxels hold a defective tensor, preprocessed by its limit", eigenvalues.defective));
   if (eigenvalues.norm_lost > 0.01)
@@ -440,6 +443,7 @@ FieldChoices choices_of(const SceneDescription& description) {
   const bool stops = !description.obstacles.empty() || !word;
   FieldChoices choices;
   choices.smoothing = field.smooth;
+  choices.noise = field.noise;
   choices.eigenvalues = field.eigenvalues;
   const bool extends = is_free ? stops : field.border == BorderChoice::extend;
   choices.interpolant = {field.interpolation, extends ? Border::extend : Border::fade};
@@ -455,14 +459,23 @@ LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const
     return prepare_field(without, choices, source);
   }
   if (!blocks.surface.triangles.empty()) choices.interpolant.border = choices.at_surface;
-  if (choices.smoothing == 0) return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source);
+  if (choices.smoothing == 0 && !choices.noise)
+    return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source);
   TensorGrid grid = to_grid(blocks);
   const std::size_t non_finite = remove_non_finite(grid);
+  if (choices.noise) keep_noise(grid);
+  const double before = variation(grid);
   smooth(grid, choices.smoothing);
+  const double kept = before > 0 ? variation(grid) / before : 1;
   MadeField made = make_field(source_of(std::move(grid)), choices.eigenvalues, choices.interpolant);
   made.non_finite += non_finite;
   LoadedField loaded = with_notes(std::move(made), source);
-  loaded.notes.push_back(fmt::format("field smoothed: a Gaussian of {:g} voxels", choices.smoothing));
+  if (choices.noise) loaded.notes.push_back("field: its noise alone, in random order, and no structure");
+  if (choices.smoothing > 0)
+    loaded.notes.push_back(
+        fmt::format("{}field smoothed: a Gaussian of {:g} voxels leaves {:.0f}% of its variation{}",
+                    kept < erased && !choices.noise ? "warning: " : "", choices.smoothing, 100 * kept,
+                    kept < erased && !choices.noise ? "; if that was no noise, smooth it less" : ""));
   return loaded;
 }
 

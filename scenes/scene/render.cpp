@@ -22,8 +22,8 @@ void warn_of_step_limit(Render& render) {
 
 /// Where an annotation has no meaning for a picture.
 void warn_of_annotations(const Scene& scene, Render& render) {
-  if (!render.view) return;
   const OutputDescription& output = scene.description.output;
+  if (!render.view || output.default_annotations) return;
   if (output.wants(Annotation::scale) && !render.view->pixel_size)
     render.warnings.push_back(
         "`/output/annotations`: a picture of a perspective camera has no single scale, and gets no scale bar; choose "
