@@ -164,8 +164,8 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     result.notes.push_back("the scale bar is that of the middle of the scene, as the camera is in perspective");
   }
   if (colors.legend && (description.color.legend || output.wants(Annotation::legend)))
-    result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double) {
-      legend(image, matrix);
+    result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double exposure) {
+      legend(image, std::exp2(exposure) * matrix);
     };
   if (output.wants("tubes"))
     result.write_tubes = [tubes = turned(std::move(shapes.tubes), scene.description.turn().transpose()), colors](

@@ -152,7 +152,6 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
  public:
   const char* name() const override { return "photon_distribution"; }
   bool shows_plate() const override { return true; }
-  std::string preferred_view() const override { return soft_highlights_view; }
 
   std::vector<std::string> channels(const SceneDescription&) const override {
     return settings().density.kind == PhotonDensityKind::mesh ? plate_map_channels() : std::vector<std::string>();

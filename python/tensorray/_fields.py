@@ -129,12 +129,14 @@ def _of_voxels(keys, voxels):
     return Field._of(_tensorray.field_of_voxels(keys, voxels), keys)
 
 
-def read_vdb(file: Path, name: str = "", *, derive: Literal["none", "gradient", "hessian"] = "none",
+def read_vdb(file: Path, name: str = "", *,
+             derive: Literal["none", "gradient", "hessian", "viscous_stress", "-viscous_stress"] = "none",
              progress: Progress = None) -> Field:
     """Reads a field of an OpenVDB file.
 
     name    Name of the field; not needed if the file has one.
-    derive  "gradient" of a vector grid, "hessian" of a scalar grid, or "none": the grids are the tensor's components.
+    derive  "gradient" of a vector grid, "hessian" of a scalar grid, "viscous_stress" of a velocity or its gradient (or
+            with "-"), or "none": the grids are the tensor's components.
     """
     keys = {"file": os.path.abspath(os.fspath(file))}  # The field stays that of this file in other folders.
     if name:
@@ -160,6 +162,7 @@ def make(kind: str, resolution: int | Sequence[int] | None = None, *, min: Array
 
 
 def import_file(*files: Path, array: str | None = None, gradient_of: str | None = None, strain_of: str | None = None,
+                viscous_stress_of: str | None = None, negate: bool = False,
                 cells: str | None = None, order: str | None = None, frame: str | None = None,
                 resolution: int | Sequence[int] | None = None, voxel_size: float | Sequence[float] | None = None,
                 levels: int | None = None, finest: float | None = None, error: float | str | None = None,
@@ -175,6 +178,8 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
                  default: the only array.
     gradient_of  Name of the velocity whose gradient is the tensor.
     strain_of    Name of the displacement whose strain is the tensor.
+    viscous_stress_of  Name of the velocity whose viscous stress is the tensor.
+    negate       Whether the tensor changes its sign.
     cells        What tensors at cells are between their centres: linear (the default) or constant in each cell.
     order        Order of six components: vtk, fsl, mrtrix, voigt or lower; of four of a plane: plane or 2x2.
     frame        Axes of the components in a medical image: ras, lps, voxels or fsl; default: those of the order.
@@ -199,14 +204,15 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
     program = os.path.join(programs(), "tensorray-import")
     if not os.path.exists(program):
         raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
-    options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--cells": cells,
+    options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of,
+               "--viscous-stress-of": viscous_stress_of, "--cells": cells,
                "--order": order, "--frame": frame, "--resolution": resolution, "--voxel-size": voxel_size,
                "--levels": levels, "--finest": finest, "--error": error, "--origin": origin, "--bounds": bounds,
                "--mask": mask, "--thickness": thickness, "--steps": step, "--boundary": boundary, "--name": name,
                "--units": units}
     with tempfile.TemporaryDirectory() as folder:
         vdb = os.path.join(folder, "field.vdb")
-        command = [program, "--tell-progress", "-q", "-o", vdb]
+        command = [program, "--tell-progress", "-q", "-o", vdb, *["--negate"] * negate]
         for option, value in options.items():
             if value is not None:
                 values = value if isinstance(value, (tuple, list, np.ndarray)) else [value]

@@ -249,9 +249,8 @@ ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::ma
     state_->display =
         choose(settings.display, config->getDefaultDisplay(), displays_in(*config), "the list of displays");
     const std::vector<std::string> known = views_in(*config, state_->display);
-    const bool prefers = std::find(known.begin(), known.end(), settings.preferred_view) != known.end();
-    const std::string usual = prefers ? settings.preferred_view : config->getDefaultView(state_->display.c_str());
-    state_->view = choose(settings.view, usual, known, "display " + in_quotes(state_->display));
+    state_->view = choose(settings.view, config->getDefaultView(state_->display.c_str()), known,
+                          "display " + in_quotes(state_->display));
     state_->to_display = display_processor(*config, state_->display, state_->view);
     state_->encoding = encoding_of(*config, state_->display, state_->view);
     state_->xyz_to_working = find_xyz_to_working(*config);

@@ -23,7 +23,8 @@ Eigen::Matrix3d rec709_to_xyz();
 extern const char* const builtin_color_config;
 extern const char* const builtin_config_word;
 
-/// The view of the built-in config that shows light x as 1 - exp(-x) of white.
+/// The usual view of the built-in config: shows grey x as 1 - exp(-x) of white, and keeps spectral light in the
+/// display.
 extern const char* const soft_highlights_view;
 
 /// Whether this names no file, but the built-in config, or one that OpenColorIO 2.2 or newer contains (ocio://NAME).
@@ -32,9 +33,8 @@ bool is_library_config(const std::string& name);
 struct ColorSettings {
   /// An OCIO config: a file, or what is_library_config tells. Empty: $OCIO, or the built-in config if that is not set.
   std::string config;
-  std::string display;           ///< A display of the config. Empty: the config's default display.
-  std::string view;              ///< A view of the display. Empty: preferred_view, or else the display's default view.
-  std::string preferred_view{};  ///< Any name: counts if `view` is empty, and the display has such a view.
+  std::string display;  ///< A display of the config. Empty: the config's default display.
+  std::string view;     ///< A view of the display. Empty: the display's default view.
 };
 
 /// Converts colours to the working space in place: `count` pixels of R, G, B, A. The colours are not multiplied by

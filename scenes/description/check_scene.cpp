@@ -162,6 +162,9 @@ void check_spectral_output(const SceneDescription& scene, const SceneSource& sou
 }
 
 void check_scene(SceneDescription& scene, const Json& json, const SceneSource& source) {
+  // Eq. 7 makes −τ of −p I + τ, whose signs are those of pressure.
+  if (scene.field.derive == Derive::negative_viscous_stress && scene.field.eigenvalues == Eigenvalues::automatic)
+    scene.field.eigenvalues = Eigenvalues::raw;
   scene.default_lights = !given(json, "/lights");
   scene.default_objects = !given(json, "/objects");
   std::string& ocio = scene.output.ocio;

@@ -16,7 +16,7 @@
 
 namespace tensorray {
 
-inline Words words(Derive) { return {"none", "gradient", "hessian"}; }
+inline Words words(Derive) { return {"none", "gradient", "hessian", "viscous_stress", "-viscous_stress"}; }
 inline Words words(Eigenvalues) { return {"auto", "raw", "absolute", "positive"}; }
 
 inline Choices<Interpolation> choices(Interpolation) {

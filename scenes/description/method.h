@@ -92,9 +92,6 @@ class Method {
     return std::nullopt;
   }
 
-  /// The view of a display that suits its pictures, if the scene names none (ColorSettings::preferred_view).
-  virtual std::string preferred_view() const { return {}; }
-
   /// Whether the field bends its light: it has a scale then, and a direction in which it shows most.
   virtual bool bends_light() const { return true; }
 

@@ -31,7 +31,8 @@ inline void describe(FieldDescription& field, KeyVisitor& visit) {
   visit("name", field.name, "name of the field in the file; not needed if there is only one");
   visit.generator("generate", field.generate, "an analytic field instead of a file");
   visit("derive", field.derive,
-        "derivative that makes the tensor: gradient of a vector grid, hessian of a scalar grid");
+        "derivative that makes the tensor: gradient of a vector grid, hessian of a scalar grid, viscous_stress of a "
+        "velocity or of its gradient, -viscous_stress: what acts in the whole stress -pI + viscous_stress");
   visit.section("components", field.components,
                 "scalar grids of the file that are the components, whatever their names");
   visit.exclude("components", {"generate"});
@@ -39,7 +40,8 @@ inline void describe(FieldDescription& field, KeyVisitor& visit) {
         between(0, max_smoothing));
   visit("noise", field.noise, "replace the field by its noise alone, without structure, for a picture beside its own");
   visit("eigenvalues", field.eigenvalues,
-        "raw: as they are; absolute: |T|; positive: (T^2)^(1/2); auto: absolute if the field is symmetric, else raw",
+        "raw: as they are; absolute: |T|; positive: (T^2)^(1/2); auto: absolute if the field is symmetric (not "
+        "of -viscous_stress), else raw",
         knob());
   visit("interpolation", field.interpolation, "what the field is between its voxels: smooth (cubic), or linear");
   visit("border", field.border,
@@ -210,8 +212,7 @@ inline void describe(OutputDescription& output, KeyVisitor& visit) {
   visit("ocio", output.ocio,
         "OpenColorIO config: a file, ocio://NAME, or built-in; default: $OCIO, or the built-in one");
   visit("display", output.display, "OpenColorIO display; default: that of the config", knob());
-  visit("view", output.view,
-        "OpenColorIO view; default: Soft highlights for light on a plate, otherwise that of the display", knob());
+  visit("view", output.view, "OpenColorIO view; default: that of the display", knob());
   visit("annotations", output.annotations,
         "what is drawn over `image`: a scale bar, the world's axes, a legend, the lines of bodies");
   visit("caption", output.caption, "a line over `image`; {field.scale} is the value of a key, # counts frames");

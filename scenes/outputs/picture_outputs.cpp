@@ -172,11 +172,13 @@ ImageMetadata provenance(const Scene& scene, const Render& render) {
 
 double display_exposure(const Scene& scene, const Render& render) {
   if (scene.description.output.exposure) return *scene.description.output.exposure;
-  if (render.exposure) return *render.exposure;
+  const bool is_soft = scene.color.view() == soft_highlights_view;
+  // Soft highlights darken what is bright: half a stop more keeps the half of white.
+  if (render.exposure) return *render.exposure + (is_soft ? 0.5 : 0);
   const std::optional<double> bright = brightest_hundredth(render.linear);
   if (!bright) return 0;
   // Soft highlights show undisturbed light (1) as 0.63 of white, and eight times as much not quite as white.
-  if (scene.color.view() == soft_highlights_view) return std::log2(std::clamp(*bright, 1.0, 8.0) / *bright);
+  if (is_soft) return std::log2(std::clamp(*bright, 1.0, 8.0) / *bright);
   constexpr double shown_as = 0.9;  // Display-linear.
   return std::log2(shown_as / *bright);
 }

@@ -324,8 +324,7 @@ struct LoadedLight {
 
 LoadedLight load_light(const SceneDescription& description) {
   const OutputDescription& output = description.output;
-  const std::string preferred_view = description.integrator.method().preferred_view();
-  LoadedLight light{ColorManagement({output.ocio, output.display, output.view, preferred_view}), {}, {}};
+  LoadedLight light{ColorManagement({output.ocio, output.display, output.view}), {}, {}};
   if (!description.bending.rgb) light.spectrum = load_spectrum(description.light.spectrum);
   light.bands = bands_of(light.spectrum, description);
   return light;

@@ -68,7 +68,7 @@ struct Render {
   std::vector<PlatePhoton> photons;       ///< Filled if the scene asks for it.
   std::vector<ScalarGrid> grids;          ///< Volumes that the method computes, if the scene asks for them.
   std::vector<Path> paths;                ///< Paths of the method path_tracing.
-  std::optional<double> exposure;         ///< Exposure of the picture in stops; none: chosen by its brightness.
+  std::optional<double> exposure;         ///< Stops that keep the picture's colours; none: chosen by its brightness.
   ImageMetadata metadata;                 ///< Entries of the method for the headers of its files.
   /// Writes the tubes about `paths`; empty unless the scene asks for them.
   std::function<void(const std::filesystem::path&, const std::vector<Path>& paths)> write_tubes;

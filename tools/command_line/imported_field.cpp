@@ -46,6 +46,8 @@ void add_import_options(CLI::App& command, ImportChoices& choices) {
   for (const auto& [flag, meaning] : {std::pair("--order", "Of the tensor's components, as for `tensorray import`"),
                                       std::pair("--array", "The array that is the tensor, likewise"),
                                       std::pair("--gradient-of", "The velocity whose gradient it is, likewise"),
+                                      std::pair("--strain-of", "The displacement whose strain it is, likewise"),
+                                      std::pair("--viscous-stress-of", "The velocity of a viscous stress, likewise"),
                                       std::pair("--frame", "The axes of the components, likewise"),
                                       std::pair("--voxel-size", "The largest edge of a voxel, likewise"),
                                       std::pair("--levels", "Most sizes of voxels, likewise"),

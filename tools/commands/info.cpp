@@ -257,9 +257,9 @@ void add_info_command(CLI::App& program) {
   command
       ->add_option("--derive", options->derive,
                    "Tell of the tensor that is derived from the grid --field, or from the only one: the gradient of a "
-                   "vector grid, or the hessian of a scalar grid")
-      ->transform(CLI::Transformer(
-          std::map<std::string, Derive>{{"gradient", Derive::gradient}, {"hessian", Derive::hessian}}));
+                   "vector grid, the hessian of a scalar grid, or the viscous stress of a velocity or of its gradient")
+      ->transform(CLI::Transformer(std::map<std::string, Derive>{
+          {"gradient", Derive::gradient}, {"hessian", Derive::hessian}, {"viscous_stress", Derive::viscous_stress}}));
   add_import_options(*command, options->import);
   command->add_option("--smooth", options->smooth, "Smooth the field first, by so many voxels (`field.smooth`)")
       ->check(CLI::Range(0.0, max_smoothing));

@@ -101,9 +101,11 @@ void apply_mask(TensorGrid& grid, const std::filesystem::path& file) {
   });
 }
 
-void make_symmetric(TensorGrid& grid) {
-  tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
-    for (Eigen::Matrix3f& value : grid.blocks[i].values) value = (0.5f * (value + value.transpose())).eval();
+/// Changes every tensor of a level.
+template <class Change>
+void change_tensors(TensorBlocks& blocks, const Change& change) {
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    for (Eigen::Matrix3f& value : blocks[i].values) value = change(value);
   });
 }
 
@@ -145,7 +147,10 @@ TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings
   report.lattice.emplace();
   TensorGrid grid = settings.take == Take::tensor ? tensors_of(lattice, settings.order, *report.lattice)
                                                   : gradient_of(lattice, *report.lattice);
-  if (settings.take == Take::strain) make_symmetric(grid);
+  if (settings.take != Take::tensor)
+    change_tensors(grid.blocks, [&](const Eigen::Matrix3f& G) -> Eigen::Matrix3f {
+      return tensor_of_gradient(settings.take, G.cast<double>()).cast<float>();
+    });
   if (settings.sampling.bounds) crop(grid, *settings.sampling.bounds);
   if (!settings.mask.empty()) apply_mask(grid, settings.mask);
   grid.metadata["tensorray:voxels"] = fmt::format("{} {} {}", lattice.size.x(), lattice.size.y(), lattice.size.z());
@@ -368,7 +373,9 @@ void require_place(const std::filesystem::path& file, const TensorGrid& grid) {
 }
 
 std::string tensor_name(const std::string& array, Take take) {
-  const char* const ending = take == Take::tensor ? "" : take == Take::gradient ? "_gradient" : "_strain";
+  const std::string flag = flag_of(take);  // --strain-of
+  std::string ending = take == Take::tensor ? "" : "_" + flag.substr(2, flag.size() - 5);
+  std::replace(ending.begin(), ending.end(), '-', '_');
   return (array.empty() ? "tensor" : array) + ending;
 }
 
@@ -412,6 +419,11 @@ TensorGrid import_tensors(const ImportSettings& given, const Progress& progress,
                    : "all voxels are background or not finite");
   require_place(file, grid);
   warn_of_same(grid, report);
+  if (settings.negate) {
+    const auto negated = [](const Eigen::Matrix3f& value) -> Eigen::Matrix3f { return -value; };
+    change_tensors(grid.blocks, negated);
+    for (TensorBlocks& level : grid.finer) change_tensors(level, negated);
+  }
   grid.name = tensor_name(grid.name, settings.take);
   grid.metadata["tensorray:source"] = file.filename().string();
   return grid;

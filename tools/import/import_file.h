@@ -22,6 +22,7 @@ struct ImportSettings {
   std::vector<std::filesystem::path> files;
   std::string array;  ///< Its name, or a list of its components (mesh_tensors.h); empty: the only suitable one.
   Take take = Take::tensor;
+  bool negate = false;                          ///< Whether tensors change their signs.
   CellValues cell_values = CellValues::linear;  ///< Of tensors at the cells of a mesh.
   std::optional<TensorOrder> order;             ///< Order of six components, where the file does not state it.
   /// For files of voxels only `bounds` is used, except for VTK files; for .npy also a voxel size, that of the file.

@@ -236,6 +236,14 @@ FieldGrids given_grids(const std::filesystem::path& path, const std::vector<Grid
   return field;
 }
 
+/// How the gradient of a velocity is made of grids: not at all, if they are its components.
+Derive gradient_in(const std::vector<GridInfo>& grids, const std::string& name, const ComponentGrids& given) {
+  if (!given.empty()) return ComponentGrids{{}, given.vector}.empty() ? Derive::none : Derive::gradient;
+  const std::vector<std::string> names = names_in(grids, tensor_layouts());
+  const bool has_tensor = name.empty() ? !names.empty() : std::find(names.begin(), names.end(), name) != names.end();
+  return has_tensor ? Derive::none : Derive::gradient;
+}
+
 /// The level that a grid's name has at its end; 0: none.
 std::size_t level_in(const std::string& name) {
   const std::size_t at = name.rfind('@');
@@ -290,14 +298,17 @@ std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids) {
 }
 
 FieldGrids field_grids(const std::filesystem::path& path, const std::vector<GridInfo>& all, const std::string& name,
-                       Derive derive, const ComponentGrids& components) {
+                       Derive wanted, const ComponentGrids& components) {
   const std::vector<GridInfo> grids = coarsest(all);
+  const Derive derive = is_stress(wanted) ? gradient_in(grids, name, components) : wanted;
   FieldGrids field;
   if (!components.empty()) {
     field = given_grids(path, grids, name, derive, components);
+    field.derive = derive;
     add_finer(path, all, field);
     return field;
   }
+  field.derive = derive;
   field.name = chosen_name(path, grids, name, derive);
   const std::vector<Layout>& layouts = layouts_for(derive);
   const Layout& layout =

@@ -19,7 +19,14 @@ enum class Derive {
   none,      ///< The grids are the tensor's components.
   gradient,  ///< A Vec3 grid v, or three scalar grids: T(i, j) = ∂v_i/∂x_j, finite differences, world axes.
   hessian,   ///< A scalar grid f: T(i, j) = ∂²f/∂x_i∂x_j, finite differences, world axes.
+  /// The stress of a fluid of viscosity 1, G + Gᵀ − ⅔ tr G I: of a vector's gradient G, or of the tensor field G.
+  viscous_stress,
+  negative_viscous_stress,  ///< What bends light of −p I + (viscous stress) with Eq. 7: p I bends none.
 };
+
+inline bool is_stress(Derive derive) {
+  return derive == Derive::viscous_stress || derive == Derive::negative_viscous_stress;
+}
 
 /// What a VDB file contains, apart from voxel values.
 struct GridInfo {
@@ -48,6 +55,7 @@ struct FieldGrids {
   std::string name;
   std::vector<FieldPart> parts;
   std::vector<std::vector<FieldPart>> finer;  ///< Of each finer level.
+  Derive derive = Derive::none;               ///< What makes tensors of their values: not a stress, but its gradient.
 };
 
 /// What the names of the grids of a level end in: "", "@1", "@2", "@3".
@@ -62,6 +70,7 @@ std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids);
 /// (NAME_0, NAME.0, NAME[0] … 8); or nine, or the six of a symmetric tensor, named by their axes (NAMExx, NAME_xx,
 /// NAME.xx, also in capitals, or by numbers from 1, or from 0: NAME11, NAME_11, ...). A vector is a Vec3 grid, or
 /// three scalar grids NAME.x, NAME_x, NAMEx, NAME[0], NAME.0, NAME_0, ...
+/// Of a stress, a tensor counts before a vector.
 /// The grids of finer levels have the names of level 0, with "@1", "@2" or "@3" behind them.
 /// @throw std::runtime_error, one line that names the file, lists its grids or fields, and names the fix.
 FieldGrids field_grids(const std::filesystem::path& path, const std::vector<GridInfo>& grids, const std::string& name,

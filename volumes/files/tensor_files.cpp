@@ -16,6 +16,7 @@
 #include "base/text/text.h"
 #include "volumes/files/grid_voxels.h"
 #include "volumes/files/surface_grids.h"
+#include "volumes/tensors/finite_differences.h"
 
 namespace tensorray {
 namespace {
@@ -141,8 +142,7 @@ void check_level(const std::filesystem::path& path, const BlockSource& source, c
 }
 
 /// Adds the finer levels of a field. @throw std::runtime_error if they do not fit to those before.
-void add_levels(const std::filesystem::path& path, const VdbFile& file, const FieldGrids& field, Derive derive,
-                BlockSource& source) {
+void add_levels(const std::filesystem::path& path, const VdbFile& file, const FieldGrids& field, BlockSource& source) {
   std::size_t bricks = source.shapes.size();
   for (const std::vector<FieldPart>& parts : field.finer) {
     const std::vector<FieldGrid> grids = field_grids_of(file, parts);
@@ -151,7 +151,7 @@ void add_levels(const std::filesystem::path& path, const VdbFile& file, const Fi
     if (!same_transform(right, common_transform(path, grids)))
       fail(path, fmt::format("grid {} must have the transform of level 0, with voxels of 1/{} of their size",
                              parts.front().grid, 1 << level));
-    const std::size_t bytes = derive != Derive::none ? sizeof(SampleBlock) : min_brick_bytes;
+    const std::size_t bytes = field.derive != Derive::none ? sizeof(SampleBlock) : min_brick_bytes;
     std::vector<BlockShape> shapes = find_blocks(path, grids, bytes);
     check_level(path, source, shapes);
     bricks += 8 * refined_by(shapes).size();
@@ -162,16 +162,29 @@ void add_levels(const std::filesystem::path& path, const VdbFile& file, const Fi
 
 /// The derived tensors of all levels, in memory.
 BlockSource derived_source(const std::filesystem::path& path, const VdbFile& file, const FieldGrids& field,
-                           Derive derive, const BlockSource& source) {
+                           const BlockSource& source) {
   const auto blocks_of_level = [&](std::size_t level, const auto& parts, const auto& shapes) {
     const Eigen::Affine3d to_world = to_world_of_level(source.to_world, static_cast<int>(level));
-    return derived_blocks(path, field_grids_of(file, parts), derive, shapes, to_world.inverse().linear());
+    return derived_blocks(path, field_grids_of(file, parts), field.derive, shapes, to_world.inverse().linear());
   };
   TensorGrid grid{source.name, source.to_world, {}, source.metadata, source.surface};
   grid.blocks = blocks_of_level(0, field.parts, source.shapes);
   for (std::size_t i = 0; i < field.finer.size(); ++i)
     grid.finer.push_back(blocks_of_level(i + 1, field.finer[i], source.finer[i].shapes));
   return source_of(std::move(grid));
+}
+
+/// The stress of the velocity gradients that a source has.
+BlockSource stress_of(BlockSource source, float sign) {
+  const auto stress = [sign](const Fill& fill) -> Fill {
+    return [=](std::size_t i, TensorBlock& block) {
+      fill(i, block);
+      for (Eigen::Matrix3f& value : block.values) value = sign * viscous_stress(value);
+    };
+  };
+  source.fill = stress(source.fill);
+  for (BlockLevel& level : source.finer) level.fill = stress(level.fill);
+  return source;
 }
 
 [[noreturn]] void fail_too_large(const std::filesystem::path& path, const std::string& field) {
@@ -269,26 +282,27 @@ openvdb::FloatGrid::Ptr float_grid(const ScalarGrid& grid) {
 
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path) { return infos_of(read_vdb(path)); }
 
-BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string& name, Derive derive,
+BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string& name, Derive wanted,
                             const ComponentGrids& components) {
-  const FieldGrids field = field_grids(path, list_vdb(path), name, derive, components);
+  const FieldGrids field = field_grids(path, list_vdb(path), name, wanted, components);
   const VdbFile file = read_vdb(path, grid_names(field));
   const std::vector<FieldGrid> grids = field_grids_of(file, field.parts);
   BlockSource result;
   result.name = field.name;
   result.to_world = common_transform(path, grids);
   result.metadata = metadata_of(file.metadata, *grids.front().file.grid);
-  const bool derives = derive != Derive::none;
+  const bool derives = field.derive != Derive::none;
   try {
     result.surface = read_surface(path, file, field.name, result.to_world);
     result.shapes = find_blocks(path, grids, derives ? sizeof(SampleBlock) : min_brick_bytes);
     if (result.shapes.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
-    add_levels(path, file, field, derive, result);
-    if (derives) return derived_source(path, file, field, derive, result);
+    add_levels(path, file, field, result);
+    if (derives) result = derived_source(path, file, field, result);
   } catch (const std::bad_alloc&) {
     fail_too_large(path, result.name);
   }
-  result.fill = fill_of(path, grids);
+  if (!derives) result.fill = fill_of(path, grids);
+  if (is_stress(wanted)) return stress_of(std::move(result), wanted == Derive::viscous_stress ? 1.0f : -1.0f);
   return result;
 }
 

@@ -38,4 +38,11 @@ TensorBlocks staggered_gradient(const SampleBlocks& blocks, const Eigen::Matrix3
 /// T(i, j) = ∂²f/∂x_i∂x_j, world axes; exactly symmetric.
 TensorBlocks hessian(const SampleBlocks& blocks, const Eigen::Matrix3d& to_index);
 
+/// The viscous stress where a fluid of viscosity 1 has the velocity gradient T: T + Tᵀ − ⅔ tr T I, symmetric.
+template <class Matrix>
+Matrix viscous_stress(const Matrix& T) {
+  using Scalar = typename Matrix::Scalar;
+  return T + T.transpose() - Scalar(2) / 3 * T.trace() * Matrix::Identity();
+}
+
 }  // namespace tensorray

@@ -380,6 +380,8 @@ TEST(ComponentNames, ThreeScalarsAreAVector) {
   EXPECT_LT((tensor_of_file(folder / "a.vtu", list, {}, Take::gradient) - gradient).norm(), 1e-4);
   EXPECT_LT((tensor_of_file(folder / "a.vtu", list, {}, Take::strain) - 0.5 * (gradient + gradient.transpose())).norm(),
             1e-4);
+  const Matrix3d stress = (Matrix3d() << -26.0 / 3, -2, 10, -2, -2.0 / 3, -2, 10, -2, 28.0 / 3).finished();
+  EXPECT_LT((tensor_of_file(folder / "a.vtu", list, {}, Take::viscous_stress) - stress).norm(), 1e-4);
   refuses(folder / "a.vtu", "X Velocity,Y Velocity", {}, "--gradient-of lists 2 arrays, and a vector has 3",
           Take::gradient);
 }

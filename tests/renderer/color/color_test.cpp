@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
+#include "renderer/color/file_colors.h"
 #include "renderer/spectra/spectrum.h"
 #include "tests/renderer/support.h"
 
@@ -80,10 +81,10 @@ const std::string linear_role = "  scene_linear: linear\n";
 const std::string aces_role = "  aces_interchange: aces\n";
 const std::string xyz_role = "  cie_xyz_d65_interchange: xyz\n";
 
-TEST_F(ColorTest, APreferredViewCountsWhereTheDisplayHasItAndNoneIsNamed) {
-  EXPECT_EQ(ColorManagement({"", "", "", soft_highlights_view}).view(), soft_highlights_view);
-  EXPECT_EQ(ColorManagement({"", "", "Raw", soft_highlights_view}).view(), "Raw");
-  EXPECT_EQ(ColorManagement({"", "", "", "Elsewhere"}).view(), "Un-tone-mapped");
+TEST_F(ColorTest, HighlightsAreSoftUnlessAViewIsNamed) {
+  EXPECT_EQ(ColorManagement({}).view(), soft_highlights_view);
+  EXPECT_EQ(ColorManagement({"", "Rec.1886", ""}).view(), soft_highlights_view);
+  EXPECT_EQ(ColorManagement({"", "", "Raw"}).view(), "Raw");
 }
 
 TEST_F(ColorTest, SoftHighlightsAreExponential) {
@@ -93,11 +94,60 @@ TEST_F(ColorTest, SoftHighlightsAreExponential) {
     EXPECT_NEAR(displayed_grey(color, value), srgb(shown), 1e-3) << value;
     EXPECT_NEAR(displayed_grey(rec1886, value), std::pow(shown, 1 / 2.4), 1e-3) << value;
   }
-  Image pure(1, 1, {"R", "G", "B"});
-  pure.pixels = {0.5f, -40, 0};  // Out of gamut, as light of one wavelength is.
-  color.to_display(pure);
-  EXPECT_NEAR(pure.pixels[0], srgb(1 - std::exp(-0.5)), 1e-3);
-  EXPECT_NEAR(pure.pixels[1], 0, 1e-3);
+}
+
+/// Oklab's a and b of linear Rec.709 (Ottosson 2020), which may be out of gamut.
+Eigen::Vector2d oklab(const Eigen::Vector3d& rgb) {
+  Eigen::Matrix3d to_lms;
+  to_lms << 0.4122214708, 0.5363325363, 0.0514459929, 0.2119034982, 0.6806995451, 0.1073969566, 0.0883024619,
+      0.2817188376, 0.6299787005;
+  const Eigen::Vector3d root = (to_lms * rgb).unaryExpr([](double x) { return std::cbrt(x); });
+  return {Eigen::Vector3d(1.9779984951, -2.4285922050, 0.4505937099).dot(root),
+          Eigen::Vector3d(0.0259040371, 0.7827717662, -0.8086757660).dot(root)};
+}
+
+/// From black over light of a wavelength, whose greatest component is `peak`, to white of the same.
+Image ramp_over(double wavelength, double peak, int size) {
+  const Eigen::Vector3d rgb = rec709_to_xyz().inverse() * observer(wavelength), pure = peak * rgb / rgb.maxCoeff();
+  Image image(size, 1, {"R", "G", "B"});
+  for (int i = 0; i < size; ++i) {
+    const double at = 2.0 * i / (size - 1), white = std::max(0.0, at - 1);
+    const double part = at < 1 ? at * at : 1 - white;
+    const Eigen::Vector3d light = part * pure + Eigen::Vector3d::Constant(white * peak);
+    for (int c = 0; c < 3; ++c) image.pixel(i, 0)[c] = static_cast<float>(light[c]);
+  }
+  return image;
+}
+
+TEST_F(ColorTest, SoftHighlightsKeepSpectralLightInTheDisplayWithoutSteps) {
+  const ColorManagement color({});
+  constexpr int size = 1001;
+  double turned = 0, chroma = 0, clipped_chroma = 0;
+  int lit = 0, at_limit = 0;
+  for (double wavelength = 390; wavelength <= 700; wavelength += 2)
+    for (const double peak : {0.3, 1.0, 3.0}) {
+      const Image light = ramp_over(wavelength, peak, size);
+      Image shown = light;
+      color.to_display(shown);
+      for (int i = 1; i < size; ++i)
+        for (int c = 0; c < 3; ++c)
+          ASSERT_LT(std::abs(shown.pixel(i, 0)[c] - shown.pixel(i - 1, 0)[c]), 0.01) << wavelength << ' ' << i;
+      for (int i = size / 4; i < 3 * size / 4; ++i) {
+        const Eigen::Vector3d in = Eigen::Map<const Eigen::Vector3f>(light.pixel(i, 0)).cast<double>();
+        const Eigen::Vector3d value = Eigen::Map<const Eigen::Vector3f>(shown.pixel(i, 0)).cast<double>();
+        const Eigen::Vector3d out = value.unaryExpr([](double v) { return srgb_light(v); });
+        const Eigen::Vector3d clipped = in.unaryExpr([](double v) { return 1 - std::exp(-std::max(v, 0.0)); });
+        const Eigen::Vector2d a = oklab(in), b = oklab(out);
+        at_limit += out.minCoeff() <= 1e-4 || out.maxCoeff() >= 0.9999;
+        turned += std::acos(std::clamp(a.dot(b) / (a.norm() * b.norm()), -1.0, 1.0));
+        chroma += b.norm();
+        clipped_chroma += oklab(clipped).norm();
+        ++lit;
+      }
+    }
+  EXPECT_LT(at_limit, 0.03 * lit);
+  EXPECT_LT(turned / lit * 180 / EIGEN_PI, 6);
+  EXPECT_GT(chroma, 0.7 * clipped_chroma);
 }
 
 TEST_F(ColorTest, AdaptationIsBradfords) {
@@ -122,7 +172,8 @@ TEST_F(ColorTest, SaturatedWhitesStayFiniteAndNeutral) {
 }
 
 TEST_F(ColorTest, DisplayCurves) {
-  const ColorManagement color({}), rec1886({"", "Rec.1886", ""}), raw({"", "", "Raw"});
+  const std::string plain = "Un-tone-mapped";
+  const ColorManagement color({"", "", plain}), rec1886({"", "Rec.1886", plain}), raw({"", "", "Raw"});
   for (const float value : {0.0f, 0.001f, 0.18f, 0.5f, 1.0f}) {
     EXPECT_NEAR(displayed_grey(color, value), srgb(value), 1e-4);
     EXPECT_NEAR(displayed_grey(rec1886, value), std::pow(value, 1 / 2.4), 1e-4);
@@ -192,7 +243,7 @@ TEST_F(ColorTest, UnknownNamesListTheKnownOnes) {
               AllOf(HasSubstr("built-in"), HasSubstr("\"CRT\""), HasSubstr("\"sRGB\", \"Rec.1886\"")));
   EXPECT_THAT(
       error_of({"", "sRGB", "Filmic"}),
-      AllOf(HasSubstr("\"Filmic\""), HasSubstr("\"Un-tone-mapped\", \"Soft highlights\", \"ACES SDR\", \"Raw\"")));
+      AllOf(HasSubstr("\"Filmic\""), HasSubstr("\"Soft highlights\", \"Un-tone-mapped\", \"ACES SDR\", \"Raw\"")));
 }
 
 TEST_F(ColorTest, DisplaysWithoutAnInverseAreShownButNotStated) {

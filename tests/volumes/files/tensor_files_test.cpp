@@ -321,6 +321,27 @@ TEST(TensorFiles, GradientOfALinearFieldIsExactInWorldAxes) {
     }
 }
 
+TEST(TensorFiles, ViscousStressIsThatOfAVelocityOrOfItsGradient) {
+  Matrix3d jacobian, stress;
+  jacobian << 1, -2, 0.5, 3, 0.25, -1, 0.125, 4, 1;
+  stress << 0.5, 1, 0.625, 1, -1, 3, 0.625, 3, 0.5;  // By hand: the trace is 2.25.
+  const auto velocity = [&](const openvdb::Vec3d& p) {
+    const Vector3d v = jacobian * Vector3d(p.x(), p.y(), p.z());
+    return openvdb::Vec3d(v.x(), v.y(), v.z());
+  };
+  const Temporary of_velocity("v.vdb"), of_gradient("g.vdb");
+  write_stock(of_velocity, {ball<openvdb::Vec3DGrid>("velocity", oblique_transform(), velocity)});
+  write_tensor_vdb(of_gradient, read_tensor_vdb(of_velocity, "", Derive::gradient));
+  for (const fs::path& path : {of_velocity.path(), of_gradient.path()})
+    for (const double sign : {1, -1}) {
+      const Derive derive = sign > 0 ? Derive::viscous_stress : Derive::negative_viscous_stress;
+      const TensorGrid read = read_tensor_vdb(path, "velocity", derive);
+      EXPECT_GT(read.active_voxels(), 2000u);
+      const Matrix3d middle = find(read, {0, 0, 0})->cast<double>();
+      EXPECT_LE((middle - sign * stress).norm(), 1e-5) << path;
+    }
+}
+
 TEST(TensorFiles, HessianOfAQuadraticIsExactInWorldAxes) {
   Matrix3d second;
   second << 2, 1, -0.5, 1, -3, 0.25, -0.5, 0.25, 1;

@@ -155,10 +155,11 @@ Array gradient_of(vtkDataSet& mesh, const Array& vectors) {
   return is_whole_grid(mesh, *vectors) ? differences_along_grid(mesh, vectors) : mean_of_derivatives(mesh, *vectors);
 }
 
-void make_symmetric(vtkDoubleArray& tensors) {
+/// Makes what is taken of gradients.
+void take_of_gradients(Take take, vtkDoubleArray& tensors) {
   for (vtkIdType point = 0; point < tensors.GetNumberOfTuples(); ++point) {
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> tensor(tensors.GetPointer(9 * point));
-    tensor = (0.5 * (tensor + tensor.transpose())).eval();
+    tensor = tensor_of_gradient(take, tensor);
   }
 }
 
@@ -203,7 +204,17 @@ vtkSmartPointer<vtkDataSet> with_arrays(vtkDataSet& mesh, const Array& of_points
 }  // namespace
 
 const char* flag_of(Take take) {
-  return take == Take::tensor ? "--array" : take == Take::gradient ? "--gradient-of" : "--strain-of";
+  switch (take) {
+    case Take::tensor:
+      return "--array";
+    case Take::gradient:
+      return "--gradient-of";
+    case Take::strain:
+      return "--strain-of";
+    case Take::viscous_stress:
+      break;
+  }
+  return "--viscous-stress-of";
 }
 
 vtkDataSetAttributes& attributes_of(vtkDataSet& mesh, bool of_cells) {
@@ -277,14 +288,13 @@ vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& ar
   if (cell_values == CellValues::constant) return with_arrays(mesh, nullptr, of_cells);
   if (array.of_cells && take != Take::tensor) {
     const CellGradients gradients = cell_gradients(mesh, *given);
-    for (const Array& tensors : {gradients.of_points, gradients.of_cells})
-      if (take == Take::strain) make_symmetric(*tensors);
+    for (const Array& tensors : {gradients.of_points, gradients.of_cells}) take_of_gradients(take, *tensors);
     mark_unusable_points(mesh, *gradients.of_points);
     return with_arrays(mesh, gradients.of_points, gradients.of_cells);
   }
   const Array values = array.of_cells ? averaged_to_points(mesh, *given) : point_values(*given);
   const Array tensors = take == Take::tensor ? tensors_in(values, known_order) : gradient_of(mesh, values);
-  if (take == Take::strain) make_symmetric(*tensors);
+  if (take != Take::tensor) take_of_gradients(take, *tensors);
   mark_unusable_points(mesh, *tensors);
   return with_arrays(mesh, tensors, of_cells);
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tools/import/lattices/tensor_order.h"
+#include "volumes/tensors/finite_differences.h"
 
 class vtkDataArray;
 class vtkDataSet;
@@ -17,10 +18,16 @@ namespace tensorray {
 
 /// How an array becomes tensors.
 enum class Take {
-  tensor,    ///< The array's components are the tensor.
-  gradient,  ///< T(i, j) = ∂v_i/∂x_j of a vector v.
-  strain,    ///< The symmetric part of the gradient of a displacement.
+  tensor,          ///< The array's components are the tensor.
+  gradient,        ///< T(i, j) = ∂v_i/∂x_j of a vector v.
+  strain,          ///< The symmetric part of the gradient of a displacement.
+  viscous_stress,  ///< viscous_stress() of the gradient of a velocity.
 };
+
+/// The tensor of the gradient G of a vector.
+inline Eigen::Matrix3d tensor_of_gradient(Take take, const Eigen::Matrix3d& G) {
+  return take == Take::viscous_stress ? viscous_stress(G) : take == Take::strain ? (G + G.transpose()) / 2 : G;
+}
 
 /// The option with which users choose the array, for messages.
 const char* flag_of(Take take);

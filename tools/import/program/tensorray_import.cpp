@@ -49,7 +49,7 @@ constexpr double max_negative = 0.2;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, order, frame, cells = "linear", error;
+  std::string array, gradient_of, strain_of, viscous_stress_of, order, frame, cells = "linear", error;
   std::vector<int> resolution;
   std::vector<double> voxel_size, bounds, origin;
   double thickness = 0, finest = 0;
@@ -80,9 +80,10 @@ double part_of(const std::string& text) {
 
 ImportSettings settings_of(const ImportOptions& options) {
   ImportSettings settings = options.settings;
-  settings.array = options.array + options.gradient_of + options.strain_of;  // They exclude each other.
+  settings.array = options.array + options.gradient_of + options.strain_of + options.viscous_stress_of;  // One.
   if (!options.gradient_of.empty()) settings.take = Take::gradient;
   if (!options.strain_of.empty()) settings.take = Take::strain;
+  if (!options.viscous_stress_of.empty()) settings.take = Take::viscous_stress;
   settings.order = named(options.order, tensor_orders());
   settings.frame = named(options.frame, component_frames());
   settings.surface = !options.no_surface;
@@ -321,8 +322,12 @@ void add_what(CLI::App& command, ImportOptions& options) {
                          "made on the mesh itself");
   auto* strain = command.add_option("--strain-of", options.strain_of,
                                     "Take the symmetric part of the gradient of this displacement");
-  array->excludes(gradient, strain);
-  gradient->excludes(strain);
+  auto* stress = command.add_option("--viscous-stress-of", options.viscous_stress_of,
+                                    "Take the viscous stress of this velocity, T + T' - 2/3 tr T I of its gradient T");
+  array->excludes(gradient, strain, stress);
+  gradient->excludes(strain, stress);
+  strain->excludes(stress);
+  command.add_flag("--negate", options.settings.negate, "Change the sign of the tensors, for example to pressure > 0");
   command
       .add_option(
           "--order", options.order,
