@@ -8,6 +8,7 @@ find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(assimp REQUIRED)
 find_package(PNG REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(OpenEXR 3 REQUIRED)
 
 # On Debian, OpenVDB's find module is outside CMake's search path.
@@ -40,7 +41,6 @@ if(TENSORRAY_IMPORT)
   find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
                IOCGNSReader IOCore IOEnSight IOExodus IOGeometry IOLegacy IOParallel IOXML cgns exodusII hdf5)
   find_package(LibXml2 REQUIRED)
-  find_package(ZLIB REQUIRED)
 
   # The CMake packages of these two libraries do not work with Debian's other packages.
   find_path(Teem_INCLUDE_DIR teem/nrrd.h REQUIRED)

@@ -43,6 +43,9 @@ class Archive {
     copy(&value, sizeof value);
   }
 
+  /// The same, compressed: `count` structs of `size` bytes that resemble each other. @throw DamagedArchive.
+  void copy_packed(void* values, std::size_t count, std::size_t size);
+
   /// Of a vector of such, or a string, with its size. There is memory for it only where bytes back it. @throw as above.
   template <class Values>
   void copy_list(Values& values) {

@@ -119,11 +119,13 @@ void find_or_make(Job* job, const std::string& name, const std::function<void()>
     copy(archive);
     return archive.finish();
   }
+  const Clock::time_point begun = Clock::now();
   make();
   if (!job || !job->is_long()) return;
+  const double seconds = seconds_since(begun);
   Archive archive;
   copy(archive);
-  job->keep(name, archive.take());
+  if (std::string bytes = archive.take(); job->is_worth(bytes.size(), seconds)) job->keep(name, std::move(bytes));
 }
 
 }  // namespace tensorray

@@ -56,8 +56,15 @@ class Job {
   /// Whether this run makes a unit.
   bool has(std::size_t unit) const { return !is_shard || unit % part_.count == part_.index; }
 
-  /// Whether results that need no more than the time before them are worth keeping: half of the interval has passed.
+  /// Whether results that need no more than the time before them may be worth keeping: half of the interval has passed.
   bool is_long() const { return is_root(ranks) && interval > 0 && seconds_since(begun_) >= interval / 2; }
+
+  /// Whether such a result is worth its bytes: a shard's serves others; a checkpoint holds what takes long for its
+  /// size.
+  bool is_worth(std::size_t bytes, double seconds) const {
+    constexpr double bytes_of_interval = 64e6;
+    return is_shard || static_cast<double>(bytes) * interval <= bytes_of_interval * seconds;
+  }
 
   // Set from outside, before the work begins:
   bool is_shard = false;   ///< Results of the part are wanted, and no picture.
@@ -95,8 +102,8 @@ struct Units {
 /// @throw Cancelled; DamagedArchive; as Ranks::all_gather; what `make` and `copy` throw.
 void make_units(const Units& units, Job* job, const std::string& phase, const Progress& progress);
 
-/// A result that is found, or made; it is kept if that took long. @param job  Null: it is made. @param make  All ranks
-/// call it, and have it then. @param copy  To or from bytes. @throw as above.
+/// A result that is found, or made; it is kept if that took long, also for its size. @param job  Null: it is made.
+/// @param make  All ranks call it, and have it then. @param copy  To or from bytes. @throw as above.
 void find_or_make(Job* job, const std::string& name, const std::function<void()>& make,
                   const std::function<void(Archive& archive)>& copy);
 

@@ -262,7 +262,9 @@ class LensMethod : public MethodWith<LensDescription> {
   const char* name() const override { return "lens"; }
   bool shows_plate() const override { return true; }
 
-  std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
+  std::vector<std::string> channels(const SceneDescription&) const override { return channel_names(lens_channels()); }
+
+  std::vector<Output> outputs() const override { return picture_outputs({spectral_output(), maps_output()}); }
 
   std::vector<NamedFile> inputs() const override {
     const auto* file = std::get_if<std::filesystem::path>(&settings().image);

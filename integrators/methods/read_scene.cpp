@@ -91,7 +91,8 @@ SceneDescription read_scene(const std::filesystem::path& path, const SceneChange
 }
 
 SceneDescription read_scene_json(Json json, const std::filesystem::path& path, const SceneChanges& changes) {
-  const SceneSource source{path};
+  SceneSource source{path};
+  source.is_y_up = given(json, "/world/up") && json["world"]["up"] == "y";
   std::vector<std::filesystem::path> outputs = changes.outputs;
   if (changes.frame) {
     set_frame(json, *changes.frame, source);

@@ -199,12 +199,14 @@ MaterialSettings settings_of(const MaterialDescription& description, const std::
 
 }  // namespace
 
-ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle) {
+ShadedSurface read_mesh_surface(const SceneDescription& scene, const std::filesystem::path& file,
+                                std::optional<double> smooth_angle) {
   if (smooth_angle) *smooth_angle *= pi / 180;
-  MeshWithNormals read = read_mesh_with_normals(file, smooth_angle);
+  MeshWithNormals read = read_mesh_with_normals(file, smooth_angle, scene.turn());
   ShadedSurface surface;
   surface.shape = std::move(read.mesh);
   surface.normals = std::move(read.normals);
+  surface.places = std::move(read.places);
   return surface;
 }
 
@@ -230,7 +232,7 @@ void add_context(const Scene& scene, const PathScene& paths, Job* job, const Pro
   if (context.box) add_surface(box_edges(scene.field), plain(0.12, 1));
   if (context.obstacles)
     for (const std::filesystem::path& file : scene.description.obstacles)
-      add_surface(read_mesh_surface(file), plain(0.6, 0.5));
+      add_surface(read_mesh_surface(scene.description, file), plain(0.6, 0.5));
   if (context.body > 0 && scene.geometry.has_cut()) {
     ShadedSurface body;
     body.shape = *scene.geometry.surfaces().cut;

@@ -10,6 +10,7 @@
 #include "integrators/path_files/path_files.h"
 #include "integrators/seeds/seeds.h"
 #include "renderer/images/image.h"
+#include "scenes/scene/turning.h"
 #include "volumes/tensors/invariants.h"
 
 namespace tensorray {
@@ -45,6 +46,12 @@ std::vector<Eigen::Vector3d> threshold_positions(const SeedDescription& seeds, c
   return threshold_seeds(field, threshold, seeds.count, seed);
 }
 
+SeedList turned(SeedList seeds, const Eigen::Matrix3d& turn) {
+  for (auto* vectors : {&seeds.positions, &seeds.directions})
+    for (Eigen::Vector3d& vector : *vectors) vector = turn * vector;
+  return seeds;
+}
+
 SeedList seed_list(const Scene& scene, const SeedDescription& seeds) {
   const TensorField& field = scene.field;
   const Beam& beam = scene.beam;
@@ -66,7 +73,7 @@ SeedList seed_list(const Scene& scene, const SeedDescription& seeds) {
     case SeedKind::file:
       if (seeds.file.empty())
         throw std::invalid_argument("the kind \"file\" needs `file`, a text file with x y z in each line");
-      return read_seeds(seeds.file);
+      return turned(read_seeds(seeds.file), scene.description.turn());
   }
   throw std::logic_error("unknown kind of seeds");
 }
@@ -175,6 +182,7 @@ PathScene load_paths(const Scene& scene, const PathTracingDescription& settings,
   PathScene paths{settings, {}, {}, load_lights(scene, settings.bands, notes)};
   if (!settings.paths.empty()) {
     paths.paths = read_paths(settings.paths);
+    turn_paths(paths.paths, scene.description.turn());
   } else {
     try {
       paths.seeds =

@@ -124,6 +124,13 @@ SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<P
   return render_surfaces(shaded, camera, tracer_settings(scene.description, paths_.settings), run.callbacks);
 }
 
+/// @param turn  A rotation.
+TubeMesh turned(TubeMesh tubes, const Eigen::Matrix3d& turn) {
+  for (Eigen::Vector3d& vertex : tubes.mesh.vertices) vertex = turn * vertex;
+  for (Eigen::Vector3f& normal : tubes.normals) normal = turn.cast<float>() * normal;
+  return tubes;
+}
+
 /// Whether the file of paths has the tensors at their points.
 bool stores_tensors(const OutputDescription& output) {
   return output.wants("paths") && tensorray::stores_tensors(output.files.at("paths"));
@@ -152,13 +159,17 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   PathShapes shapes = make_shapes(scene, paths_, result.paths, colors, camera);
   result.exposure = 0;
   if (has_picture) result.view = picture_view(camera);
+  if (has_picture && output.default_annotations && !result.view->pixel_size) {
+    result.view->pixel_size = pixel_size(camera, camera.position + camera.focus_distance * camera.forward);
+    result.notes.push_back("the scale bar is that of the middle of the scene, as the camera is in perspective");
+  }
   if (colors.legend && (description.color.legend || output.wants(Annotation::legend)))
     result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double exposure) {
       legend(image, std::exp2(exposure) * matrix);
     };
   if (output.wants("tubes"))
-    result.write_tubes = [tubes = std::move(shapes.tubes), colors](const std::filesystem::path& file,
-                                                                   const std::vector<Path>& paths) {
+    result.write_tubes = [tubes = turned(std::move(shapes.tubes), scene.description.turn().transpose()), colors](
+                             const std::filesystem::path& file, const std::vector<Path>& paths) {
       write_tubes(file, tubes, paths, colors);
     };
   if (!has_picture) return result;
@@ -204,6 +215,10 @@ class PathTracingMethod : public MethodWith<PathTracingDescription> {
   const char* name() const override { return "path_tracing"; }
   bool is_sampled() const override { return true; }
 
+  std::vector<std::string> channels(const SceneDescription& scene) const override {
+    return surface_channels(scene, false);
+  }
+
   std::vector<Output> outputs() const override {
     return picture_outputs(
         {spectral_output(),
@@ -230,10 +245,15 @@ void PathTracingMethod::check(SceneDescription& scene, const Json& json, const S
   if (paths.radius.min && paths.radius.max && *paths.radius.min > *paths.radius.max)
     source.fail("`/integrator/radius`: `min` must not exceed `max`");
   if (!chosen) return;
+  if (!given(json, "/output/annotations")) {
+    scene.output.annotations = {Annotation::scale, Annotation::legend};
+    scene.output.default_annotations = true;
+  }
   if (scene.bending.settings.max_steps > 1'000'000)
     source.fail("`/bending/max_steps` must be at most 1e6 with path_tracing, which keeps every step of a path");
-  check_memory(scene.camera.resolution.cast<double>().prod() * (200.0 + 24.0 * paths.bands), "`/camera/resolution`",
-               source);
+  check_memory(scene.camera.resolution.cast<double>().prod() *
+                   (400.0 + (scene.output.wants("spectral") ? 24.0 * paths.bands : 0)),
+               "`/camera/resolution`", source);
   warn_unused(scene, json, "/integrator/seeds", "/integrator/paths");
   if (given(json, "/integrator/samples"))  // Other programs and the lens use this name.
     scene.warnings.push_back("`/integrator/samples` has no effect with path_tracing; use `/integrator/max_samples`");

@@ -177,8 +177,16 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
   settings.pass_samples = std::max(1, settings.min_samples);
   settings.noise_threshold = settings.min_samples < 2 ? 0 : description.noise;
   if (description.max_seconds) settings.max_seconds = *description.max_seconds;
+  settings.spectral = scene.output.wants("spectral");
   settings.seed = scene.seed;
   return settings;
+}
+
+std::vector<std::string> surface_channels(const SceneDescription& scene, bool bends) {
+  SurfacePicture picture;
+  picture.bends = bends;
+  if (bends) picture.landed = Film(1, 1, 3);
+  return channel_names(surface_channels(picture, light_groups(scene).names));
 }
 
 void set_groups(const SceneDescription& scene, ShadedScene& shaded) {
@@ -189,7 +197,7 @@ void set_groups(const SceneDescription& scene, ShadedScene& shaded) {
 
 void set_picture(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
                  const SceneDescription& scene, Render& render) {
-  const Image colors = linear_image(picture.radiance, light.bands, light.xyz_to_working);
+  const Image colors = color_image(picture.color);
   const ChannelTable<SurfacePixel> table = surface_channels(picture, light_groups(scene).names);
   Image image(colors.width, colors.height, channel_names(table));
   const bool is_colored = description.background == Background::color;

@@ -34,6 +34,9 @@ std::vector<Light> make_lights(const SceneDescription& description, const ShownL
 
 PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTracingDescription& description);
 
+/// The channels of pictures of surfaces. @param bends  Whether light bends in them.
+std::vector<std::string> surface_channels(const SceneDescription& scene, bool bends);
+
 /// Sets the groups of the scene's lights.
 void set_groups(const SceneDescription& scene, ShadedScene& shaded);
 
@@ -55,9 +58,10 @@ class Job;
 /// @throw std::invalid_argument if a metal is unknown.
 Material load_material(const MaterialDescription& description, const ShownLight& light);
 
-/// A mesh as a surface that is shaded with its normals.
+/// A mesh of the scene as a surface that is shaded with its normals.
 /// @param smooth_angle  As of ObjectDescription. @throw as read_mesh.
-ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle = {});
+ShadedSurface read_mesh_surface(const SceneDescription& scene, const std::filesystem::path& file,
+                                std::optional<double> smooth_angle = {});
 
 /// Adds the scene's context to `surfaces`, and the materials that it needs to `materials`.
 /// @param job  Whose ranks make the light on the plate together, and which keeps it; null: alone.

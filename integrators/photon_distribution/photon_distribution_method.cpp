@@ -78,7 +78,7 @@ Render render_of(const Scene& scene, PlateLight light, const Progress& progress,
   const SceneDescription& description = scene.description;
   const auto start = Clock::now();
   Render result = std::move(light.render);
-  if (!light.map.triangles.empty() && description.output.wants("exr"))
+  if (!light.map.triangles.empty() && (description.output.wants("exr") || description.output.wants("maps")))
     result.linear = with_channels(result.linear, plate_map(light.map, scene, progress, job));
   if (job && !is_root(job->ranks)) return {};
   if (description.output.wants("spectral"))
@@ -138,8 +138,9 @@ std::size_t bytes_per_pixel(const SceneDescription& scene, PhotonDensityKind kin
   const auto channels = static_cast<std::size_t>(channel_count(scene));
   const std::size_t linear = 3 * sizeof(float);
   if (kind == PhotonDensityKind::mesh) {
-    const std::size_t map = plate_map_channels() * sizeof(float);
-    return 3 * sizeof(double) + linear + (scene.output.wants("exr") ? linear + 2 * map : 0) +
+    const std::size_t map = plate_map_channels().size() * sizeof(float);
+    return 3 * sizeof(double) + linear +
+           (scene.output.wants("exr") || scene.output.wants("maps") ? linear + 2 * map : 0) +
            (is_spectral ? channels * (sizeof(double) + sizeof(float)) : 0);
   }
   const std::size_t planes = is_spectral || channels <= 3 ? channels : 3;
@@ -152,9 +153,14 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
   const char* name() const override { return "photon_distribution"; }
   bool shows_plate() const override { return true; }
 
+  std::vector<std::string> channels(const SceneDescription&) const override {
+    return settings().density.kind == PhotonDensityKind::mesh ? plate_map_channels() : std::vector<std::string>();
+  }
+
   std::vector<Output> outputs() const override {
     return picture_outputs(
         {spectral_output(),
+         maps_output(),
          {"photons", "the photons, one by one", {".vdb", ".vtp"}, write_photons},
          {"fluence", "the light inside the volume, as a fog volume", {".vdb"}, write_grids, ".fluence.vdb"}});
   }

@@ -138,7 +138,7 @@ PlateLight light_on_plate(const Scene& scene, const Progress& progress, Job* job
   return light;
 }
 
-std::size_t plate_map_channels() { return channel_names(plate_channels()).size(); }
+std::vector<std::string> plate_map_channels() { return channel_names(plate_channels()); }
 
 Image plate_map(const FlowMap& map, const Scene& scene, const Progress& progress, Job* job) {
   const Plate& plate = *scene.geometry.surfaces().plate;

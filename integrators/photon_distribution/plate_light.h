@@ -41,8 +41,8 @@ PlateLight light_on_plate(const Scene& scene, const Progress& progress, Job* job
 /// @throw Cancelled; as Ranks::all_gather.
 PlateLight mesh_light(const Scene& scene, const Progress& progress, Job* job, const ShowLight& show);
 
-/// The number of channels of plate_map.
-std::size_t plate_map_channels();
+/// The channels of plate_map.
+std::vector<std::string> plate_map_channels();
 
 /// How the light of the band nearest to 550 nm (in RGB mode: green) lands at the centre of each pixel. All channels are
 /// 0 where no light lands. Where the map folds, they describe the sheet that is displaced least.

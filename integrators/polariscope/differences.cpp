@@ -1,10 +1,9 @@
 #include "integrators/polariscope/differences.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
 
 #include "volumes/bricks/brick_layout.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 // The code before HWY_AFTER_NAMESPACE is compiled once for each kind of processor. It calls no inline functions of
 // other headers: the linker would keep only one of their copies, which may be compiled for the wrong processor.
@@ -19,10 +18,15 @@
 namespace tensorray {
 namespace {
 
-/// Where a point is: in the cell of some coefficients, from 0 to 1.
-struct PointCell {
-  const float* first;  // a and b of the first of its 4³ coefficients; null: they are 0.
-  float fraction[3];
+/// The cells that points may be in, and how they are found; along each axis.
+struct CellBox {
+  double along[3];   ///< Of the rays, index space.
+  double first[3];   ///< Index space.
+  double extent[3];  ///< Voxels of level 0.
+  double scale;      ///< Cells in a voxel of level 0.
+  std::int32_t last[3];
+  DifferenceSampler* sampler;
+  DifferenceSampler::Cell (*find)(DifferenceSampler& sampler, const std::int32_t (&cell)[3]);
 };
 
 }  // namespace
@@ -34,43 +38,94 @@ namespace tensorray::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Eight = hn::CappedTag<float, 8>;  // a and b of four coefficients along z.
+using Floats = hn::CappedTag<float, ray_lanes>;
+using Ints = hn::RebindToSigned<Floats>;
+using F = hn::Vec<Floats>;
+constexpr int lanes = static_cast<int>(hn::MaxLanes(Floats()));
 
-/// The weights of the cubic B-spline along an axis.
-HWY_INLINE void weights_of(float t, float (&weights)[4]) {
-  const float u = 1 - t;
-  weights[0] = u * u * u / 6;
-  weights[1] = 2.0f / 3 - t * t * (2 - t) / 2;
-  weights[2] = 2.0f / 3 - u * u * (2 - u) / 2;
-  weights[3] = t * t * t / 6;
-}
-
-void sample_cells(const PointCell* cells, std::size_t count, float* a, float* b) {
-  const Eight d;
-  constexpr std::size_t row = 2 * CubicBrick::width;  // Floats between neighbours along y.
-  for (std::size_t p = 0; p < count; ++p) {
-    a[p] = b[p] = 0;
-    if (!cells[p].first) continue;
-    float x[4], y[4], z[4], twice[8], sums[8];
-    weights_of(cells[p].fraction[0], x);
-    weights_of(cells[p].fraction[1], y);
-    weights_of(cells[p].fraction[2], z);
-    for (int i = 0; i < 8; ++i) twice[i] = z[i / 2];
-    for (std::size_t c = 0; c < 8; c += hn::Lanes(d)) {
-      auto sum = hn::Zero(d);
-      for (std::size_t i = 0; i < 4; ++i) {
-        const float* const at = cells[p].first + i * CubicBrick::width * row + c;
-        auto line = hn::Mul(hn::Set(d, y[0]), hn::LoadU(d, at));
-        for (std::size_t j = 1; j < 4; ++j) line = hn::MulAdd(hn::Set(d, y[j]), hn::LoadU(d, at + j * row), line);
-        sum = hn::MulAdd(hn::Set(d, x[i]), line, sum);
-      }
-      hn::StoreU(hn::Mul(sum, hn::LoadU(d, twice + c)), d, sums + c);
-    }
-    for (int i = 0; i < 8; i += 2) {
-      a[p] += sums[i];
-      b[p] += sums[i + 1];
+/// Sets the cells of points, and the places in them, from 0 to 1.
+HWY_INLINE void locate(const CellBox& box, const double (&origin)[3][ray_lanes], const double* place, int at,
+                       std::int32_t (&cell)[3][lanes], float (&fraction)[3][lanes]) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double along = box.along[axis], first = box.first[axis], extent = box.extent[axis];
+    const std::int32_t last = box.last[axis];
+    for (int i = 0; i < lanes; ++i) {
+      double p = origin[axis][at + i] + place[at + i] * along - first;
+      p = p > 0 ? p : 0;  // In this order NaN becomes 0.
+      p = (p < extent ? p : extent) * box.scale;
+      std::int32_t near = static_cast<std::int32_t>(p);
+      near = near < last ? near : last;
+      cell[axis][i] = near;
+      fraction[axis][i] = static_cast<float>(p - near);
     }
   }
+}
+
+/// The weights of the cubic B-spline along an axis.
+HWY_INLINE void weights_of(F t, F (&weights)[4]) {
+  const Floats d;
+  const F sixth = hn::Set(d, 1.0f / 6), two_thirds = hn::Set(d, 2.0f / 3), half = hn::Set(d, 0.5f);
+  const F u = hn::Sub(hn::Set(d, 1), t), tt = hn::Mul(t, t), uu = hn::Mul(u, u), two = hn::Set(d, 2);
+  weights[0] = hn::Mul(hn::Mul(uu, u), sixth);
+  weights[1] = hn::NegMulAdd(hn::Mul(half, tt), hn::Sub(two, t), two_thirds);
+  weights[2] = hn::NegMulAdd(hn::Mul(half, uu), hn::Sub(two, u), two_thirds);
+  weights[3] = hn::Mul(hn::Mul(tt, t), sixth);
+}
+
+/// a and b of points in one cell.
+HWY_INLINE void sum_cell(const float* first, const F (&weights)[3][4], F& a, F& b) {
+  const Floats d;
+  constexpr int row = 2 * CubicBrick::width;  // Floats between neighbours along y.
+  a = b = hn::Zero(d);
+#pragma GCC unroll 4
+  for (int i = 0; i < 4; ++i) {
+    F sheet_a = hn::Zero(d), sheet_b = sheet_a;
+#pragma GCC unroll 4
+    for (int j = 0; j < 4; ++j) {
+      const float* const at = first + (i * CubicBrick::width + j) * row;
+      F line_a = hn::Mul(weights[2][0], hn::Set(d, at[0])), line_b = hn::Mul(weights[2][0], hn::Set(d, at[1]));
+#pragma GCC unroll 3
+      for (int k = 1; k < 4; ++k) {
+        line_a = hn::MulAdd(weights[2][k], hn::Set(d, at[2 * k]), line_a);
+        line_b = hn::MulAdd(weights[2][k], hn::Set(d, at[2 * k + 1]), line_b);
+      }
+      sheet_a = hn::MulAdd(weights[1][j], line_a, sheet_a);
+      sheet_b = hn::MulAdd(weights[1][j], line_b, sheet_b);
+    }
+    a = hn::MulAdd(weights[0][i], sheet_a, a);
+    b = hn::MulAdd(weights[0][i], sheet_b, b);
+  }
+}
+
+void sample_steps(const CellBox& box, RaySteps& steps) {
+  const Floats d;
+  const Ints ints;
+  for (int point = 0; point < 2; ++point)
+    for (int at = 0; at < ray_lanes; at += lanes) {
+      alignas(64) std::int32_t cell[3][lanes];
+      alignas(64) float fraction[3][lanes];
+      locate(box, steps.origin, steps.place[point], at, cell, fraction);
+      F a = hn::Zero(d), b = a;
+      auto left = hn::Gt(hn::LoadU(d, steps.length + at), a);
+      for (auto lane = hn::FindFirstTrue(d, left); lane >= 0; lane = hn::FindFirstTrue(d, left)) {
+        const std::int32_t of[3] = {cell[0][lane], cell[1][lane], cell[2][lane]};
+        auto same = left;
+        for (int axis = 0; axis < 3; ++axis)
+          same = hn::And(same, hn::RebindMask(d, hn::Eq(hn::Load(ints, cell[axis]), hn::Set(ints, of[axis]))));
+        left = hn::AndNot(same, left);
+        const DifferenceSampler::Cell found = box.find(*box.sampler, of);
+        if (!found.first) continue;
+        F weights[3][4], cell_a, cell_b;
+        for (int axis = 0; axis < 3; ++axis)
+          weights_of(hn::MulAdd(hn::Load(d, fraction[axis]), hn::Set(d, found.scale), hn::Set(d, found.offset[axis])),
+                     weights[axis]);
+        sum_cell(found.first, weights, cell_a, cell_b);
+        a = hn::IfThenElse(same, cell_a, a);
+        b = hn::IfThenElse(same, cell_b, b);
+      }
+      hn::StoreU(a, d, steps.a[point] + at);
+      hn::StoreU(b, d, steps.b[point] + at);
+    }
 }
 
 }  // namespace
@@ -80,30 +135,16 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tensorray {
 
-HWY_EXPORT(sample_cells);
-
-namespace {
+HWY_EXPORT(sample_steps);
 
 constexpr std::size_t kept_bricks = 512;  // That are converted; 5 MB.
 
-/// The brick of the finest level at a point. `cell` and `fraction`, of level 0 in its brick, become those of the brick.
-TensorBrick brick_of(const TensorField& field, const Eigen::Vector3i& at, Eigen::Vector3i& cell,
-                     Eigen::Vector3d& fraction) {
-  if (field.levels() == 1) return field.brick(at);
-  const Eigen::Vector3f position = (cell.cast<double>() + fraction).cast<float>();
-  const LeafBrick leaf = field.leaf(at, {position.x(), position.y(), position.z()});
-  const Eigen::Vector3d first = Eigen::Map<const Eigen::Vector3f>(leaf.first.data()).cast<double>();
-  const Eigen::Vector3d local = (cell.cast<double>() + fraction - first) * leaf.scale;
-  cell = local.array().floor().matrix().cast<int>().cwiseMax(0).cwiseMin(TensorBrick::cells - 1);
-  fraction = local - cell.cast<double>();
-  return leaf.brick;
-}
-
-}  // namespace
-
-DifferenceSampler::DifferenceSampler(const TensorField& field, const Eigen::Vector3d& u, const Eigen::Vector3d& w,
-                                     double factor)
+DifferenceSampler::DifferenceSampler(const TensorField& field, const Eigen::Vector3d& along, const Eigen::Vector3d& u,
+                                     const Eigen::Vector3d& w, double factor)
     : field_(field),
+      finest_(field.levels() - 1),
+      first_(field.voxels().min().cast<int>() * (1 << finest_)),
+      along_(along),
       to_a_(factor * (u * u.transpose() - w * w.transpose())),
       to_b_(factor * (u * w.transpose() + w * u.transpose())),
       converted_(field.is_cubic() ? kept_bricks : 0) {}
@@ -116,74 +157,66 @@ const float* DifferenceSampler::coefficients_of(const TensorBrick& brick) {
   if (found.of == brick.bending) return found.values.data();
   found.of = brick.bending;
   found.values.resize(2 * CubicBrick::coefficients);
-  // Component i, column by column, of T − T₂₂ I.
-  std::array<float, TensorBrick::general> a{}, b{};
-  for (int i = 0; i < TensorBrick::general; ++i) {
-    const int stored = TensorBrick::stored_component(brick.components, i);
-    a[static_cast<std::size_t>(stored)] += static_cast<float>(to_a_(i % 3, i / 3));
-    b[static_cast<std::size_t>(stored)] += static_cast<float>(to_b_(i % 3, i / 3));
-  }
-  const auto components = static_cast<std::size_t>(brick.components);
-  for (std::size_t k = 0; k < CubicBrick::coefficients; ++k) {
-    float sum_a = 0, sum_b = 0;
-    for (std::size_t c = 0; c < components; ++c) {
-      sum_a += a[c] * brick.bending[k * components + c];
-      sum_b += b[c] * brick.bending[k * components + c];
+  const Eigen::Matrix3f to_a = to_a_.cast<float>(), to_b = to_b_.cast<float>();
+  for (int k = 0; k < CubicBrick::coefficients; ++k) {
+    float* const to = found.values.data() + 2 * k;
+    to[0] = to[1] = 0;
+    for (int i = 0; i < TensorBrick::general; ++i) {  // Component i, column by column, of T − T₂₂ I.
+      const int stored = TensorBrick::stored_component(brick.components, i);
+      const float value = brick.bending[CubicBrick::bending_offset(brick.components, k) + stored];
+      to[0] += to_a.data()[i] * value;
+      to[1] += to_b.data()[i] * value;
     }
-    found.values[2 * k] = sum_a;
-    found.values[2 * k + 1] = sum_b;
   }
   return found.values.data();
 }
 
-void DifferenceSampler::sample_cubic(const std::vector<Eigen::Vector3d>& points, std::vector<float>& a,
-                                     std::vector<float>& b) {
-  // A brick that is converted may take the place of one that is waited for: cells are sampled before that.
-  constexpr std::size_t together = 64;
-  std::array<PointCell, together> cells;
-  const Eigen::Array3i first = field_.voxels().min().cast<int>().array();
-  const Eigen::Array3d extent = field_.voxels().sizes().array();
-  const Eigen::Array3i last_cell = (extent.cast<int>() - 1).max(0);
-  const float *values = nullptr, *of = nullptr;
-  std::size_t begin = 0, count = 0;
-  const auto flush = [&] {
-    HWY_DYNAMIC_DISPATCH(sample_cells)(cells.data(), count, &a[begin], &b[begin]);
-    begin += count;
-    count = 0;
-  };
-  for (const Eigen::Vector3d& point : points) {
-    const Eigen::Array3d inside = (point.array() - first.cast<double>()).max(0).min(extent);
-    const Eigen::Array3i near = inside.cast<int>().min(last_cell);
-    Eigen::Vector3d fraction = (inside - near.cast<double>()).matrix();
-    Eigen::Vector3i cell = (first + near).matrix();
-    const Eigen::Vector3i at(cell.x() >> 3, cell.y() >> 3, cell.z() >> 3);
-    cell -= TensorBrick::cells * at;
-    const TensorBrick brick = brick_of(field_, at, cell, fraction);
-    if (count == together || brick.bending != of) {
-      flush();
-      of = brick.bending;
-      values = coefficients_of(brick);
-    }
-    const int number = CubicBrick::coefficient(cell.x() - 1, cell.y() - 1, cell.z() - 1);
-    cells[count++] = {
-        values ? values + 2 * number : nullptr,
-        {static_cast<float>(fraction.x()), static_cast<float>(fraction.y()), static_cast<float>(fraction.z())}};
+DifferenceSampler::Cell DifferenceSampler::find(const std::int32_t (&cell)[3]) {
+  const Eigen::Vector3i index = first_ + Eigen::Vector3i(cell[0], cell[1], cell[2]);
+  const int shift = 3 + finest_;
+  const Eigen::Vector3i at(index.x() >> shift, index.y() >> shift, index.z() >> shift);
+  Eigen::Vector3i within = index - (1 << shift) * at;
+  Cell result{nullptr, 1, {0, 0, 0}};
+  if (finest_ > 0) {
+    const float size = 1.0f / static_cast<float>(1 << finest_);  // Of the cell, voxels of level 0.
+    const Eigen::Vector3f corner = size * within.cast<float>(), middle = corner.array() + size / 2;
+    const LeafBrick leaf = field_.leaf(at, {middle.x(), middle.y(), middle.z()});
+    const Eigen::Map<const Eigen::Vector3f> first(leaf.first.data());
+    within = (leaf.scale * (middle - first)).cast<int>();
+    result.scale = leaf.scale * size;
+    Eigen::Map<Eigen::Vector3f>(result.offset) = leaf.scale * (corner - first) - within.cast<float>();
+    values_ = coefficients_of(leaf.brick);
+  } else if (at != at_) {
+    values_ = coefficients_of(field_.brick(at));
+    at_ = at;
   }
-  flush();
+  if (values_) result.first = values_ + 2 * CubicBrick::coefficient(within.x() - 1, within.y() - 1, within.z() - 1);
+  return result;
 }
 
-void DifferenceSampler::sample(const std::vector<Eigen::Vector3d>& points, std::vector<float>& a,
-                               std::vector<float>& b) {
-  a.resize(points.size());
-  b.resize(points.size());
-  if (points.empty()) return;
-  if (field_.is_cubic()) return sample_cubic(points, a, b);
-  TensorSampler sampler(field_);
-  for (std::size_t p = 0; p < points.size(); ++p) {
-    const Eigen::Matrix3d T = sampler.at(field_.to_world() * points[p]);
-    a[p] = static_cast<float>(to_a_.cwiseProduct(T).sum());
-    b[p] = static_cast<float>(to_b_.cwiseProduct(T).sum());
+void DifferenceSampler::sample(RaySteps& steps) {
+  if (!field_.is_cubic()) {
+    TensorSampler sampler(field_);
+    for (int point = 0; point < 2; ++point)
+      for (int i = 0; i < ray_lanes; ++i) {
+        const Eigen::Vector3d index(steps.origin[0][i], steps.origin[1][i], steps.origin[2][i]);
+        const Eigen::Matrix3d T = sampler.at(field_.to_world() * (index + steps.place[point][i] * along_));
+        steps.a[point][i] = static_cast<float>(to_a_.cwiseProduct(T).sum());
+        steps.b[point][i] = static_cast<float>(to_b_.cwiseProduct(T).sum());
+      }
+    return;
   }
+  CellBox box;
+  box.scale = 1 << finest_;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.along[axis] = along_[axis];
+    box.first[axis] = field_.voxels().min()[axis];
+    box.extent[axis] = field_.voxels().sizes()[axis];
+    box.last[axis] = std::max(static_cast<int>(box.extent[axis] * box.scale) - 1, 0);
+  }
+  box.sampler = this;
+  box.find = [](DifferenceSampler& sampler, const std::int32_t(&cell)[3]) { return sampler.find(cell); };
+  HWY_DYNAMIC_DISPATCH(sample_steps)(box, steps);
 }
 
 }  // namespace tensorray

@@ -1,34 +1,44 @@
 #pragma once
 /// @file integrators/polariscope/differences.h
-/// a = u·T u − w·T w and b = u·(T + Tᵀ) w at many points. These two are linear in T: the coefficients of a brick become
-/// those of a and b, so that a point takes a quarter of the time of a tensor.
+/// a = u·T u − w·T w and b = u·(T + Tᵀ) w at the Gauss points of steps. These two are linear in T: the coefficients of
+/// a brick become those of a and b. Rays side by side are mostly in one cell, whose coefficients are loaded once.
 
-#include <array>
-#include <cstddef>
-#include <memory>
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "integrators/polariscope/turning.h"
 #include "volumes/bricks/tensor_field.h"
-#include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 
+/// One thread's. It keeps the bricks that it converted last.
 class DifferenceSampler {
  public:
-  /// @param field   Must outlive it. @param factor  a and b are multiplied by it.
-  DifferenceSampler(const TensorField& field, const Eigen::Vector3d& u, const Eigen::Vector3d& w, double factor);
+  /// @param field   Must outlive it. @param along  Of the rays, index space. @param factor  Of a and b.
+  DifferenceSampler(const TensorField& field, const Eigen::Vector3d& along, const Eigen::Vector3d& u,
+                    const Eigen::Vector3d& w, double factor);
 
-  /// At points of index space; those outside the extent are moved to it. It is fastest if points next to each other are
-  /// in the same brick. The result at a point does not depend on the others, nor on earlier calls.
-  void sample(const std::vector<Eigen::Vector3d>& points, std::vector<float>& a, std::vector<float>& b);
+  /// Sets a and b of the rays that have a step. Points outside the extent are moved to it. The result does not depend
+  /// on earlier calls.
+  void sample(RaySteps& steps);
+
+  /// Of a cell of the finest voxels: the first of the 4³ coefficients that are in use there; null: they are 0. A
+  /// fraction of the cell, times `scale` plus `offset`, is one of the coefficients' cell.
+  struct Cell {
+    const float* first;
+    float scale, offset[3];
+  };
+  Cell find(const std::int32_t (&cell)[3]);
 
  private:
   const float* coefficients_of(const TensorBrick& brick);
-  void sample_cubic(const std::vector<Eigen::Vector3d>& points, std::vector<float>& a, std::vector<float>& b);
 
   const TensorField& field_;
+  int finest_;             // The finest level, ...
+  Eigen::Vector3i first_;  // ... and its first voxel.
+  Eigen::Vector3d along_;
   Eigen::Matrix3d to_a_, to_b_;  // a = Σ to_a_ij T_ij.
   /// Bricks that were converted last, each at a place that its address chooses: a and b of each coefficient.
   struct Converted {
@@ -36,6 +46,8 @@ class DifferenceSampler {
     std::vector<float> values;
   };
   std::vector<Converted> converted_;
+  Eigen::Vector3i at_ = Eigen::Vector3i::Constant(INT32_MIN);  // The brick of `values_`.
+  const float* values_ = nullptr;
 };
 
 }  // namespace tensorray

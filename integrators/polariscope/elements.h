@@ -24,14 +24,12 @@ struct Arrangement {
   std::vector<Element> before, after;
 };
 
-/// The number of the last polariser of a list; nothing if it has none.
-std::optional<std::size_t> last_polarizer(const std::vector<Element>& elements);
+/// The first, or the last, polariser of a list; null if it has none.
+const Element* first_polarizer(const std::vector<Element>& elements);
+const Element* last_polarizer(const std::vector<Element>& elements);
 
 /// All elements turned by `angle`, and the last polariser by `analyzer` more; degrees.
 Arrangement turned(Arrangement arrangement, double angle, double analyzer);
-
-/// The Jones matrix of elements for light of one wavelength (nm).
-Eigen::Matrix2cd jones_matrix(const std::vector<Element>& elements, double wavelength);
 
 /// What a specimen does to polarisation is a unitary matrix, w I − i (x σ_z + y σ_x + z σ_y). That is the quaternion
 /// (w, x, y, z); products of matrices are products of quaternions, and its rotation turns the vector (S1, S2, −S3) of

@@ -67,10 +67,7 @@ double greatest_integral(const Scene& scene, PolarizedLight light) {
   for (const LightRow& row : rows)
     for (const PolarPoint& point : row.points)
       if (point.length > 0) integrals.push_back(point.integral / 2);
-  if (integrals.empty()) return 0;
-  const auto high = integrals.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(integrals.size() - 1));
-  std::nth_element(integrals.begin(), high, integrals.end());
-  return *high;
+  return greatest_of_most(integrals);
 }
 
 /// A number as it is printed, so that a scene can have the same.
@@ -103,6 +100,19 @@ double choose_coefficient(const Scene& scene, const PolarizedLight& light, doubl
 }
 
 }  // namespace
+
+std::vector<Eigen::Vector3d> band_colors(const Scene& scene) {
+  std::vector<Eigen::Vector3d> colors;
+  for (const Band& band : scene.bands) colors.emplace_back(to_working(scene) * band.xyz);
+  return colors;
+}
+
+double greatest_of_most(std::vector<float>& values) {
+  if (values.empty()) return 0;
+  const auto high = values.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), high, values.end());
+  return *high;
+}
 
 LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeDescription& settings,
                                           std::vector<std::string>& notes) {

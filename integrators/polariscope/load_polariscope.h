@@ -26,6 +26,12 @@ struct LoadedLightOfPolariscope {
 LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeDescription& settings,
                                           std::vector<std::string>& notes);
 
+/// R, G and B of the light's bands, in the working space.
+std::vector<Eigen::Vector3d> band_colors(const Scene& scene);
+
+/// What 99 of 100 of the values do not exceed; 0 if there are none. Changes their order.
+double greatest_of_most(std::vector<float>& values);
+
 /// The interference colours of the scene's light, from 0 to a retardance (nm, at the reference wavelength) of a plate
 /// that is turned by 45° against the first polariser, and a cross of the polarisers' directions: P the first one, A the
 /// analyser. For Render::draw_legend. @param greatest  Finite, > 0.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include "base/constants.h"
 #include "integrators/polariscope/differences.h"
 #include "integrators/polariscope/turning.h"
@@ -14,32 +16,25 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::size_t packet_rays = 32;  // Rays that are sampled side by side.
-constexpr int most_threes = 5;           // A band has 3⁵ wavelengths at most.
-constexpr int most_sections = 10000;     // Of a ray in the body: a limit that no body reaches.
+constexpr int most_threes = 5;        // A band has 3⁵ wavelengths at most.
+constexpr int most_sections = 10000;  // Of a ray in the body: a limit that no body reaches.
 
 /// Middle of a step along its ray, from the plate, and its length.
 struct RayStep {
   double middle, length;
 };
 
-/// From where to where a ray is in a box.
-struct Section {
-  double begin, end;
-};
-
-Section section_of(const Eigen::AlignedBox3d& box, const Vector3d& origin, const Vector3d& along) {
-  Section section{-std::numeric_limits<double>::infinity(), 0};  // The plate is at 0.
+/// From where to where a ray is in a box; the plate is at 0.
+std::pair<double, double> section_of(const Eigen::AlignedBox3d& box, const Vector3d& origin, const Vector3d& along) {
+  double begin = -std::numeric_limits<double>::infinity(), end = 0;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = box.min()[axis] - origin[axis], high = box.max()[axis] - origin[axis];
-    if (along[axis] == 0) {
-      if (low > 0 || high < 0) section.end = section.begin;
-      continue;
-    }
-    section.begin = std::max(section.begin, std::min(low / along[axis], high / along[axis]));
-    section.end = std::min(section.end, std::max(low / along[axis], high / along[axis]));
+    if (along[axis] == 0 && (low > 0 || high < 0)) return {0, 0};
+    if (along[axis] == 0) continue;
+    begin = std::max(begin, std::min(low / along[axis], high / along[axis]));
+    end = std::min(end, std::max(low / along[axis], high / along[axis]));
   }
-  return section;
+  return {begin, end};
 }
 
 }  // namespace
@@ -47,29 +42,26 @@ Section section_of(const Eigen::AlignedBox3d& box, const Vector3d& origin, const
 struct PolarTracer::Ray {
   Vector3d origin, index;  // On the plate, in world and in index space.
   std::vector<RayStep> steps;
-  TurningSteps turning;
   double phase = 0, length = 0;  // Σ √(a² + b²) h, at the reference; Σ h.
   bool is_lit = true;
-
-  /// Keeps its memory.
-  void restart(double greatest) {
-    steps.clear();
-    turning.steps.clear();
-    turning.greatest = greatest;
-    phase = length = 0;
-    is_lit = true;
-  }
 };
 
-/// Rays, and arrays for their tensors.
+/// Rays side by side.
 struct PolarTracer::Packet {
-  std::vector<Ray> rays;
-  DifferenceSampler sampler;
-  std::vector<std::size_t> active;
-  std::vector<Vector3d> points;
-  std::vector<float> a, b, planes;
-  std::vector<Eigen::Vector4d> means;  // By pixel, of quaternions w, x, y, z.
-  std::vector<int> inside;             // By pixel: samples in the field.
+  std::array<Ray, ray_lanes> rays;
+  RaySteps steps;
+  std::vector<RayTurns> turns;
+  std::vector<float> planes;
+  /// Of each pixel: quaternions w, x, y, z; samples in the field.
+  struct Sum {
+    Eigen::Vector4d mean = Eigen::Vector4d::Zero();
+    int inside = 0;
+  };
+  std::vector<Sum> sums;
+};
+
+struct PolarTracer::Samplers : tbb::enumerable_thread_specific<DifferenceSampler> {
+  using enumerable_thread_specific::enumerable_thread_specific;
 };
 
 PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, const PolarizedLight& light,
@@ -80,7 +72,9 @@ PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, con
       plate_(plate),
       across_(field.to_index().linear() * light.direction),
       steps_per_length_(std::ldexp(across_.norm(), field.levels() - 1)),
-      room_(turning_room(light.bands.size())) {
+      room_(turning_room(light.bands.size())),
+      samplers_(std::make_unique<Samplers>(
+          [this] { return DifferenceSampler(field_, across_, light_.right, light_.up, light_.strength); })) {
   for (const Band& band : light.bands)
     widest_ = std::max(widest_, std::abs(light.relative(band.wavelength + band.width / 2) -
                                          light.relative(band.wavelength - band.width / 2)));
@@ -97,6 +91,8 @@ PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, con
   }
 }
 
+PolarTracer::~PolarTracer() = default;
+
 const std::vector<std::vector<float>>& PolarTracer::wavelengths_for(double phase) const {
   std::size_t threes = 0;
   double change = 2 * phase * widest_;
@@ -107,31 +103,28 @@ const std::vector<std::vector<float>>& PolarTracer::wavelengths_for(double phase
 void PolarTracer::find_steps(Ray& ray) const {
   const Vector3d& k = light_.direction;
   const Vector3d from_start = ray.origin - light_.start;
-  if (light_.aperture) {
-    ray.is_lit = light_.aperture->contains(Eigen::Vector2d(light_.aperture_axes * from_start));
-    if (!ray.is_lit) return;
-  }
-  if (!geometry_.surfaces().obstacles.empty()) {
+  ray.is_lit = true;
+  if (light_.aperture) ray.is_lit = light_.aperture->contains(Eigen::Vector2d(light_.aperture_axes * from_start));
+  if (ray.is_lit && !geometry_.surfaces().obstacles.empty()) {
     const double way = from_start.dot(k);
     const auto hit = geometry_.absorber(ray.origin - way * k, k, way);
     ray.is_lit = !hit || hit->surface != Surface::obstacle;
-    if (!ray.is_lit) return;
   }
-  const Section box = section_of(field_.index_bounds(), ray.index, across_);
-  const auto add_steps = [&](double begin, double end) {
-    if (!(end > begin)) return;
-    const double count = std::max(1.0, std::ceil((end - begin) * steps_per_length_ - 1e-6));
-    const double length = (end - begin) / count;
-    for (int i = 0; i < count; ++i) ray.steps.push_back({begin + (i + 0.5) * length, length});
-    ray.length += end - begin;
+  if (!ray.is_lit) return;
+  const auto [begin, end] = section_of(field_.index_bounds(), ray.index, across_);
+  if (!(end > begin)) return;
+  const auto add_steps = [&](double from, double to) {
+    if (!(to > from)) return;
+    const double count = std::max(1.0, std::ceil((to - from) * steps_per_length_ - 1e-6)), length = (to - from) / count;
+    for (int i = 0; i < count; ++i) ray.steps.push_back({from + (i + 0.5) * length, length});
+    ray.length += to - from;
   };
-  if (!(box.end > box.begin)) return;
-  if (!geometry_.has_cut()) return add_steps(box.begin, box.end);
-  double at = box.begin;
+  if (!geometry_.has_cut()) return add_steps(begin, end);
+  double at = begin;
   bool is_inside = geometry_.inside_cut(ray.origin + at * k, k);
   for (int i = 0; i < most_sections; ++i) {
-    const auto hit = geometry_.crossing(Surface::cut, !is_inside, ray.origin + at * k, k, box.end - at);
-    const double next = hit ? at + hit->distance : box.end;
+    const auto hit = geometry_.crossing(Surface::cut, !is_inside, ray.origin + at * k, k, end - at);
+    const double next = hit ? at + hit->distance : end;
     if (is_inside) add_steps(at, next);
     if (!hit) return;
     is_inside = !is_inside;
@@ -139,34 +132,37 @@ void PolarTracer::find_steps(Ray& ray) const {
   }
 }
 
-/// Sets the exponents of all steps of all rays: step by step, as neighbours are in the same brick.
+/// Finds the turns and phases of all rays, step by step.
 void PolarTracer::sample(Packet& packet) const {
+  DifferenceSampler& sampler = samplers_->local();
+  RaySteps& steps = packet.steps;
   std::size_t most = 0;
-  for (const Ray& ray : packet.rays) most = std::max(most, ray.steps.size());
+  for (std::size_t i = 0; i < ray_lanes; ++i) {
+    most = std::max(most, packet.rays[i].steps.size());
+    for (int axis = 0; axis < 3; ++axis) steps.origin[axis][i] = packet.rays[i].index[axis];
+  }
+  packet.turns.clear();
   for (std::size_t step = 0; step < most; ++step) {
-    packet.active.clear();
-    for (std::size_t i = 0; i < packet.rays.size(); ++i)
-      if (step < packet.rays[i].steps.size()) packet.active.push_back(i);
-    const std::size_t count = packet.active.size();
-    packet.points.resize(2 * count);
-    for (std::size_t p = 0; p < 2 * count; ++p) {
-      const Ray& ray = packet.rays[packet.active[p % count]];
-      const RayStep& at = ray.steps[step];
-      packet.points[p] = ray.index + (at.middle + (p < count ? -gauss_point : gauss_point) * at.length) * across_;
+    for (std::size_t i = 0; i < ray_lanes; ++i) {
+      const Ray& ray = packet.rays[i];
+      const RayStep at = step < ray.steps.size() ? ray.steps[step] : RayStep{0, 0};
+      steps.place[0][i] = at.middle - gauss_point * at.length;
+      steps.place[1][i] = at.middle + gauss_point * at.length;
+      steps.length[i] = static_cast<float>(at.length);
     }
-    packet.sampler.sample(packet.points, packet.a, packet.b);
-    for (std::size_t p = 0; p < count; ++p) {
-      Ray& ray = packet.rays[packet.active[p]];
-      const double h = ray.steps[step].length;
-      const double a1 = packet.a[p], b1 = packet.b[p], a2 = packet.a[count + p], b2 = packet.b[count + p];
-      ray.turning.add(h, a1, b1, a2, b2);
-      ray.phase += h * (std::sqrt(a1 * a1 + b1 * b1) + std::sqrt(a2 * a2 + b2 * b2)) / 2;
-    }
+    sampler.sample(steps);
+    if (room_ > 0) add_steps(steps, greatest_, packet.turns);
+    for (const int point : {0, 1})
+      for (std::size_t i = 0; i < ray_lanes; ++i) {
+        const float a = steps.a[point][i], b = steps.b[point][i];
+        packet.rays[i].phase += steps.length[i] * std::sqrt(a * a + b * b) / 2;
+      }
   }
 }
 
 /// Adds a ray to the light of its pixel.
-void PolarTracer::add(const Ray& ray, float weight, std::size_t x, Packet& packet, LightRow& row) const {
+void PolarTracer::add(std::size_t lane, float weight, std::size_t x, Packet& packet, LightRow& row) const {
+  const Ray& ray = packet.rays[lane];
   if (!ray.is_lit) return;
   row.lit[x] += weight;
   float* const rotations = room_ > 0 ? &row.rotations[9 * room_ * x] : nullptr;
@@ -178,16 +174,16 @@ void PolarTracer::add(const Ray& ray, float weight, std::size_t x, Packet& packe
   PolarPoint& point = row.points[x];
   point.integral += static_cast<float>(2 * ray.phase);
   point.length += static_cast<float>(ray.length);
-  ++packet.inside[x];
+  ++packet.sums[x].inside;
   if (room_ == 0) return;
   packet.planes.resize(4 * room_);
   const auto& wavelengths = wavelengths_for(ray.phase);
   for (std::size_t i = 0; i < wavelengths.size(); ++i) {
-    turn(ray.turning, wavelengths[i].data(), room_, packet.planes.data());
+    turn(packet.turns, lane, wavelengths[i].data(), room_, packet.planes.data());
     add_rotations(packet.planes.data(), weight / static_cast<float>(wavelengths.size()), room_, rotations);
     if (i == wavelengths.size() / 2)  // The middle of the band.
       for (std::size_t c = 0; c < 4; ++c)
-        packet.means[x][static_cast<int>(c)] += packet.planes[c * room_ + light_.reference];
+        packet.sums[x].mean[static_cast<int>(c)] += packet.planes[c * room_ + light_.reference];
   }
 }
 
@@ -198,34 +194,32 @@ LightRow PolarTracer::row(int y) const {
   row.rotations.resize(9 * room_ * width);
   row.lit.resize(width);
   row.points.resize(width);
-  Packet packet{{}, {field_, light_.right, light_.up, light_.strength}, {}, {}, {}, {}, {}, {}, {}};
-  packet.means.assign(width, Eigen::Vector4d::Zero());
-  packet.inside.assign(width, 0);
-  for (std::size_t line = 0; line < n; ++line)
-    for (std::size_t begin = 0; begin < width * n; begin += packet_rays) {
-      const std::size_t end = std::min(begin + packet_rays, width * n);
-      packet.rays.resize(end - begin);
-      for (std::size_t i = begin; i < end; ++i) {
-        Ray& ray = packet.rays[i - begin];
-        ray.restart(greatest_);
-        ray.origin = plate_.to_world(
-            (Eigen::Vector2d(static_cast<double>(i), static_cast<double>(line)).array() + 0.5).matrix() /
-                light_.samples +
-            Eigen::Vector2d(0, y));
-        ray.index = field_.to_index() * ray.origin;
-        find_steps(ray);
-      }
-      sample(packet);
-      for (std::size_t i = begin; i < end; ++i)
-        add(packet.rays[i - begin], 1 / static_cast<float>(n * n), i / n, packet, row);
+  Packet packet;
+  packet.sums.resize(width);
+  // Pixel by pixel, so that rays side by side are close to each other.
+  for (std::size_t begin = 0; begin < width * n * n; begin += ray_lanes) {
+    for (std::size_t i = 0; i < ray_lanes; ++i) {
+      const std::size_t pixel = (begin + i) / (n * n), sample = (begin + i) % (n * n);
+      Ray& ray = packet.rays[i];
+      ray.steps.clear();
+      ray.phase = ray.length = 0;
+      const auto place = [&](std::size_t step) { return (static_cast<double>(step) + 0.5) / light_.samples; };
+      ray.origin = plate_.to_world({static_cast<double>(pixel) + place(sample % n), y + place(sample / n)});
+      ray.index = field_.to_index() * ray.origin;
+      if (pixel < width) find_steps(ray);
     }
+    sample(packet);
+    for (std::size_t i = 0; i < std::min<std::size_t>(ray_lanes, width * n * n - begin); ++i)
+      add(i, 1 / static_cast<float>(n * n), (begin + i) / (n * n), packet, row);
+  }
   for (std::size_t x = 0; x < width; ++x) {
-    if (packet.inside[x] == 0) continue;
+    const auto inside = static_cast<float>(packet.sums[x].inside);
+    if (inside == 0) continue;
     PolarPoint& point = row.points[x];
-    point.integral /= static_cast<float>(packet.inside[x]);
-    point.length /= static_cast<float>(packet.inside[x]);
+    point.integral /= inside;
+    point.length /= inside;
     // The mean of unitary matrices is that of the middle, as they are smooth.
-    const Eigen::Vector4d mean = packet.means[x].normalized();
+    const Eigen::Vector4d mean = packet.sums[x].mean.normalized();
     const EquivalentRetarder retarder = equivalent_retarder({mean[0], mean[1], mean[2], mean[3]});
     point.phase = static_cast<float>(retarder.phase);
     point.azimuth = static_cast<float>(retarder.azimuth);
@@ -234,14 +228,40 @@ LightRow PolarTracer::row(int y) const {
   return row;
 }
 
-PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, std::size_t room)
-    : through_(room), by_rotation_(9 * room) {
+PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands,
+                     const std::vector<Vector3d>& colors)
+    : through_(turning_room(bands.size())), by_rotation_(9 * through_.size()), colors_(3 * through_.size()) {
+  const std::size_t room = through_.size();
   for (std::size_t k = 0; k < bands.size(); ++k) {
     const Analysis& analysis = analyses_.emplace_back(analysis_of(arrangement, bands[k].wavelength));
+    achromatic_ &= analysis.through == analyses_[0].through && analysis.by_rotation == analyses_[0].by_rotation;
     through_[k] = static_cast<float>(analysis.through);
     for (int i = 0; i < 9; ++i)
       by_rotation_[static_cast<std::size_t>(i) * room + k] = static_cast<float>(analysis.by_rotation(i / 3, i % 3));
+    for (int c = 0; c < 3; ++c) colors_[static_cast<std::size_t>(c) * room + k] = static_cast<float>(colors[k][c]);
   }
+}
+
+void PolarView::set_sums(LightRow& row) const {
+  row.sums.resize(27 * row.lit.size());
+  for (std::size_t x = 0; x < row.lit.size(); ++x)
+    sum_colors(row.of_pixel(x), 9, colors_.data(), row.room, &row.sums[27 * x]);
+}
+
+Eigen::Vector3f PolarView::color(const LightRow& row, std::size_t x) const {
+  const std::size_t room = row.room;
+  Eigen::Vector3f color;
+  if (!achromatic_) {
+    std::vector<float> powers(room);
+    this->powers(row, x, powers.data());
+    sum_colors(powers.data(), 1, colors_.data(), room, color.data());
+    return color;
+  }
+  sum_colors(through_.data(), 1, colors_.data(), room, color.data());
+  color *= row.lit[x];
+  for (std::size_t i = 0; i < 9; ++i)
+    color += by_rotation_[i * room] * Eigen::Map<const Eigen::Vector3f>(&row.sums[27 * x + 3 * i]);
+  return color;
 }
 
 void PolarView::powers(const LightRow& row, std::size_t x, float* powers) const {

@@ -5,6 +5,7 @@
 ///   a = u·T u − w·T w,   b = u·(T + Tᵀ) w,   dE/dz = −i (π C/λ) [[a, b], [b, −a]] E.
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -52,6 +53,7 @@ struct LightRow {
   std::vector<float> rotations;  ///< Of a pixel, nine planes of `room` each: the mean rotation (elements.h) by bands.
   std::vector<float> lit;        ///< By pixels: the part of the light that nothing stops.
   std::vector<PolarPoint> points;
+  std::vector<float> sums;  ///< By pixels: of each of the nine planes, the sums of three colours (PolarView).
 
   const float* of_pixel(std::size_t x) const { return &rotations[9 * room * x]; }
 };
@@ -63,6 +65,7 @@ class PolarTracer {
  public:
   /// All must outlive it. @param geometry  Bounds, cut and obstacles.
   PolarTracer(const TensorField& field, const Geometry& geometry, const PolarizedLight& light, const Plate& plate);
+  ~PolarTracer();
 
   /// Any thread may call it. The result depends on the row alone.
   LightRow row(int y) const;
@@ -72,9 +75,10 @@ class PolarTracer {
  private:
   struct Ray;
   struct Packet;
+  struct Samplers;
   void find_steps(Ray& ray) const;
   void sample(Packet& packet) const;
-  void add(const Ray& ray, float weight, std::size_t x, Packet& packet, LightRow& row) const;
+  void add(std::size_t lane, float weight, std::size_t x, Packet& packet, LightRow& row) const;
   const std::vector<std::vector<float>>& wavelengths_for(double phase) const;
 
   const TensorField& field_;
@@ -84,6 +88,7 @@ class PolarTracer {
   Eigen::Vector3d across_;   // k in index space.
   double steps_per_length_;  // At least.
   std::size_t room_;
+  std::unique_ptr<Samplers> samplers_;                      // Of threads: bricks that are converted.
   double widest_ = 0;                                       // Change of the relative strength within a band, at most.
   double greatest_ = 0;                                     // Relative strength.
   std::vector<std::vector<std::vector<float>>> strengths_;  // By power of three; by wavelength of a band; by band.
@@ -92,16 +97,25 @@ class PolarTracer {
 /// An arrangement's analyses of all bands, for many pixels.
 class PolarView {
  public:
-  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, std::size_t room);
+  /// @param colors  R, G and B of each band.
+  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, const std::vector<Eigen::Vector3d>& colors);
 
-  /// The power of each band (Analysis::power). @param powers  Has `room`.
+  std::size_t bands() const { return analyses_.size(); }
+
+  /// Whether the arrangement treats all bands alike, so that `sums` are enough for its colours.
+  bool is_achromatic() const { return achromatic_; }
+  void set_sums(LightRow& row) const;
+  Eigen::Vector3f color(const LightRow& row, std::size_t x) const;
+
+  /// The power of each band (Analysis::power). @param powers  Has room.
   void powers(const LightRow& row, std::size_t x, float* powers) const;
 
   Eigen::Vector4d stokes(const LightRow& row, std::size_t x, std::size_t band) const;
 
  private:
   std::vector<Analysis> analyses_;
-  std::vector<float> through_, by_rotation_;
+  bool achromatic_ = true;
+  std::vector<float> through_, by_rotation_, colors_;  // Planes.
 };
 
 }  // namespace tensorray

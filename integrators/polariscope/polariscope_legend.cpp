@@ -37,12 +37,10 @@ void draw_mark(Image& image, const Vector2d& center, double radius, double angle
 void draw_cross(Image& image, const Arrangement& arrangement) {
   const double side = std::min(image.width, image.height);
   const Vector2d center(image.width - cross_place * side, cross_place * side);
-  const auto& before = arrangement.before;
-  const auto first = std::find_if(before.begin(), before.end(),
-                                  [](const Element& element) { return element.kind == ElementKind::polarizer; });
-  if (first != before.end()) draw_mark(image, center, cross_radius * side, first->angle, "P");
-  if (const auto last = last_polarizer(arrangement.after))
-    draw_mark(image, center, cross_radius * side, arrangement.after[*last].angle, "A");
+  const Element* const first = first_polarizer(arrangement.before);
+  const Element* const last = last_polarizer(arrangement.after);
+  if (first) draw_mark(image, center, cross_radius * side, first->angle, "P");
+  if (last) draw_mark(image, center, cross_radius * side, last->angle, "A");
 }
 
 }  // namespace
@@ -50,19 +48,16 @@ void draw_cross(Image& image, const Arrangement& arrangement) {
 std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const LoadedLightOfPolariscope& loaded,
                                                        const PolariscopeDescription& settings, double greatest) {
   std::vector<Analysis> analyses;
-  std::vector<Vector3d> colors;
+  const std::vector<Vector3d> colors = band_colors(scene);
   std::vector<double> relative;
   for (const Band& band : loaded.light.bands) {
     analyses.push_back(analysis_of(loaded.arrangement, band.wavelength));
-    colors.emplace_back(to_working(scene) * band.xyz);
     relative.push_back(loaded.light.relative(band.wavelength));
   }
   const auto* word = std::get_if<ArrangementWord>(&settings.arrangement);
   const bool has_sign = word && *word == ArrangementWord::tint;
-  const std::vector<Element>& before = loaded.arrangement.before;
-  const auto first = std::find_if(before.begin(), before.end(),
-                                  [](const Element& element) { return element.kind == ElementKind::polarizer; });
-  const double twice = ((first == before.end() ? settings.angle : first->angle) + 45) * pi / 90;  // The slow axis.
+  const Element* const first = first_polarizer(loaded.arrangement.before);
+  const double twice = ((first ? first->angle : settings.angle) + 45) * pi / 90;  // The slow axis.
   const ValueRange range{has_sign ? -greatest : 0, greatest};
   const auto color = [=](double position) {
     const double phase = pi * range.value(position) / loaded.wavelength;

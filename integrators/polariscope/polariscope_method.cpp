@@ -1,7 +1,6 @@
 #include "integrators/polariscope/polariscope_method.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <system_error>
@@ -27,7 +26,7 @@ constexpr double most_orders = 1000;        // and one with more shows grey.
 
 /// What is known of a pixel.
 struct PolarPixel {
-  Eigen::Vector3d color;
+  Eigen::Vector3f color;
   const PolarPoint& point;
   double nanometres;  ///< Of a phase of 1.
 };
@@ -53,48 +52,26 @@ struct PolarPicture {
       spectrum;  ///< By pixels: each band's power, or S0 of all bands, then S1, S2, S3; empty: not wanted.
 };
 
-/// Turns traced light into pixels.
-class PolarDrawing {
- public:
-  PolarDrawing(const Scene& scene, const LoadedLightOfPolariscope& loaded, std::size_t room)
-      : bands_(loaded.light.bands),
-        view_(loaded.arrangement, bands_, room),
-        nanometres_(loaded.wavelength / (2 * pi)),
-        stokes_(scene.description.output.stokes) {
-    const Eigen::Matrix3d xyz_to_working = to_working(scene);
-    for (const Band& band : bands_) colors_.emplace_back(xyz_to_working * band.xyz);
-  }
-
-  void draw(const LightRow& row, std::size_t y, PolarPicture& picture) const {
-    const auto width = static_cast<std::size_t>(picture.image.width);
-    std::vector<float> powers(row.room);
-    for (std::size_t x = 0; x < width; ++x) {
-      view_.powers(row, x, powers.data());
-      Eigen::Vector3d color = Eigen::Vector3d::Zero();
-      for (std::size_t k = 0; k < bands_.size(); ++k) color += powers[k] * colors_[k];
-      write_channels(table_, {color, row.points[x], nanometres_},
-                     picture.image.pixel(static_cast<int>(x), static_cast<int>(y)));
-      if (picture.spectra == 0) continue;
-      float* const to = &picture.spectrum[(y * width + x) * picture.spectra];
-      for (std::size_t k = 0; k < bands_.size(); ++k) {
-        if (!stokes_) {
-          to[k] = powers[k];
-          continue;
-        }
-        const Eigen::Vector4d stokes = view_.stokes(row, x, k);
-        for (int s = 0; s < 4; ++s) to[static_cast<std::size_t>(s) * bands_.size() + k] = static_cast<float>(stokes[s]);
-      }
+/// Turns traced light into the pixels of a row. @param nanometres  Of a phase of 1.
+void draw_row(const PolarView& view, double nanometres, const LightRow& row, std::size_t y, PolarPicture& picture) {
+  static const ChannelTable<PolarPixel> table = polariscope_channels();
+  std::vector<float> powers(row.room);
+  for (std::size_t x = 0; x < row.points.size(); ++x) {
+    write_channels(table, {view.color(row, x), row.points[x], nanometres},
+                   picture.image.pixel(static_cast<int>(x), static_cast<int>(y)));
+    if (picture.spectra == 0) continue;
+    float* const to = &picture.spectrum[(y * row.points.size() + x) * picture.spectra];
+    if (picture.spectra == view.bands()) {
+      view.powers(row, x, powers.data());
+      std::copy_n(powers.begin(), view.bands(), to);
+      continue;
+    }
+    for (std::size_t k = 0; k < view.bands(); ++k) {
+      const Eigen::Vector4d stokes = view.stokes(row, x, k);
+      for (std::size_t s = 0; s < 4; ++s) to[s * view.bands() + k] = static_cast<float>(stokes[static_cast<int>(s)]);
     }
   }
-
- private:
-  std::vector<Band> bands_;
-  PolarView view_;
-  double nanometres_;
-  bool stokes_;
-  std::vector<Eigen::Vector3d> colors_;
-  ChannelTable<PolarPixel> table_ = polariscope_channels();
-};
+}
 
 /// Radiance by bands; with Stokes' parameters S1, S2 and S3 before S0. Its colours are the picture's.
 SpectralImage spectral_picture(const PolarPicture& picture, const Scene& scene) {
@@ -121,15 +98,12 @@ SpectralImage spectral_picture(const PolarPicture& picture, const Scene& scene) 
   return result;
 }
 
-/// The greatest integral of the picture, and that which 99 of 100 pixels of the field do not exceed; nm.
-std::pair<double, double> greatest_retardances(const Image& image) {
+/// The integrals of the picture's pixels in the field, nm.
+std::vector<float> integrals_of(const Image& image) {
   std::vector<float> values;
   for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
     if (image.pixels[i + length_channel] > 0) values.push_back(image.pixels[i + integral_channel]);
-  if (values.empty()) return {0, 0};
-  const auto high = values.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), high, values.end());
-  return {*std::max_element(high, values.end()), *high};
+  return values;
 }
 
 class LoadedPolariscope : public LoadedMethod {
@@ -154,7 +128,7 @@ class LoadedPolariscope : public LoadedMethod {
   LoadedLightOfPolariscope loaded_;
 };
 
-/// All that traced light depends on, the field aside.
+/// All that traced light and its sums depend on, the field aside.
 std::string LoadedPolariscope::traced_key(const Scene& scene) const {
   Json json = Json::parse(scene.description.text);
   for (const char* key : {"output", "camera", "lights", "objects", "seed"}) json.erase(key);
@@ -164,6 +138,8 @@ std::string LoadedPolariscope::traced_key(const Scene& scene) const {
     std::error_code none;
     files += fmt::format(" {}", std::filesystem::last_write_time(input.path, none).time_since_epoch().count());
   }
+  for (const Eigen::Vector3d& color : band_colors(scene))
+    files += fmt::format(" {} {} {}", color[0], color[1], color[2]);
   const Eigen::Vector3d& V = loaded_.light.direction;
   return json.dump() + files + fmt::format(" {} {} {} {}", V.x(), V.y(), V.z(), loaded_.stress_optic);
 }
@@ -183,22 +159,24 @@ Render LoadedPolariscope::render_of(const Scene& scene, const PolarPicture& pict
   const Plate& plate = *scene.geometry.surfaces().plate;
   result.view = picture_view(plate);
   result.outline = body_outline(scene, plate);
-  const auto [greatest, shown] = greatest_retardances(picture.image);
+  std::vector<float> integrals = integrals_of(picture.image);
+  const double greatest = integrals.empty() ? 0 : *std::max_element(integrals.begin(), integrals.end());
   const double order = greatest / loaded_.wavelength;
   result.notes.push_back(
       fmt::format("greatest order: {:.3g} at {:g} nm (retardance {:.4g} nm)", order, loaded_.wavelength, greatest));
-  if (greatest > 0 && order < few_orders)
+  const bool too_small = greatest > 0 && order < few_orders;
+  if (too_small || order > most_orders)
     result.warnings.push_back(
-        "the picture shows almost nothing: the retardance is far below a wavelength; check the units of "
-        "`integrator.stress_optic` and `integrator.unit_length`, or leave the first to \"auto\"");
-  if (order > most_orders)
-    result.warnings.push_back(
-        "fringes are too fine to be seen: the retardance is more than a thousand wavelengths; check the units of "
-        "`integrator.stress_optic` and `integrator.unit_length`, or leave the first to \"auto\"");
+        fmt::format("{}; check the units of `integrator.stress_optic` and `integrator.unit_length`, or leave the first "
+                    "to \"auto\"",
+                    too_small ? "the picture shows almost nothing: the retardance is far below a wavelength"
+                              : "fringes are too fine to be seen: the retardance is more than a thousand wavelengths"));
   result.metadata = {{"tensorray:stress_optic", fmt::format("{:.17g}", loaded_.stress_optic)},
                      {"tensorray:wavelength", fmt::format("{:.17g}", loaded_.wavelength)}};
-  if (scene.description.output.wants(Annotation::legend))
+  if (scene.description.output.wants(Annotation::legend)) {
+    const double shown = greatest_of_most(integrals);
     result.draw_legend = polariscope_legend(scene, loaded_, settings_, shown > 0 ? shown : loaded_.wavelength);
+  }
   result.describe_pixel = [wavelength = loaded_.wavelength](const float* pixel) {
     return std::vector<std::pair<std::string, std::string>>{
         {"order", fmt::format("{:.3f} at {:.1f} nm", pixel[integral_channel] / wavelength, wavelength)},
@@ -212,7 +190,8 @@ Render LoadedPolariscope::render(const Scene& scene, const Progress& progress, R
   const auto start = Clock::now();
   const Plate& plate = *scene.geometry.surfaces().plate;
   const PolarTracer tracer(scene.field, scene.geometry, loaded_.light, plate);
-  const PolarDrawing drawing(scene, loaded_, tracer.room());
+  const PolarView view(loaded_.arrangement, loaded_.light.bands, band_colors(scene));
+  const double nanometres = loaded_.wavelength / (2 * pi);
   const auto width = static_cast<std::size_t>(plate.resolution.x()),
              height = static_cast<std::size_t>(plate.resolution.y());
   PolarPicture picture;
@@ -223,7 +202,7 @@ Render LoadedPolariscope::render(const Scene& scene, const Progress& progress, R
 
   const std::string key = traced_key(scene);
   const std::shared_ptr<const Rows> known = scene.kept ? scene.kept->find<Rows>(key) : nullptr;
-  const std::size_t bytes = width * height * (9 * tracer.room() + 6) * sizeof(float);
+  const std::size_t bytes = width * height * (9 * tracer.room() + 33) * sizeof(float);
   const bool keeps = scene.kept && !known && bytes <= KeptResults::max_bytes;
   Rows traced(keeps ? height : 0);
 
@@ -232,9 +211,10 @@ Render LoadedPolariscope::render(const Scene& scene, const Progress& progress, R
   rows.kind = "polarised row";
   rows.round = rows_per_round;
   rows.make = [&](std::size_t y) {
-    if (known) return drawing.draw((*known)[y], y, picture);
+    if (known) return draw_row(view, nanometres, (*known)[y], y, picture);
     LightRow row = tracer.row(static_cast<int>(y));
-    drawing.draw(row, y, picture);
+    if (keeps || view.is_achromatic()) view.set_sums(row);
+    draw_row(view, nanometres, row, y, picture);
     if (keeps) traced[y] = std::move(row);
   };
   rows.copy = [&](std::size_t y, Archive& archive) {
@@ -262,7 +242,11 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
   bool shows_plate() const override { return true; }
   bool bends_light() const override { return false; }
 
-  std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
+  std::vector<std::string> channels(const SceneDescription&) const override {
+    return channel_names(polariscope_channels());
+  }
+
+  std::vector<Output> outputs() const override { return picture_outputs({spectral_output(), maps_output()}); }
 
   std::vector<NamedFile> inputs() const override {
     const auto* file = std::get_if<std::filesystem::path>(&settings().stress_optic);
@@ -271,7 +255,11 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
 
   /// Bends nothing: the scale is not chosen, and eigenvalues stay what they are.
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
-    if (!chosen) return;
+    if (!chosen) {
+      if (given(json, "/output/stokes"))
+        scene.warnings.push_back("`/output/stokes` has no effect: it belongs to the method \"polariscope\"");
+      return;
+    }
     if (scene.bending.rgb) source.fail("`/bending/rgb`: the polariscope needs light with wavelengths; remove it");
     if (given(json, "/field/scale"))
       scene.warnings.push_back("`/field/scale` has no effect with polariscope; its key is `/integrator/stress_optic`");
@@ -280,6 +268,8 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
       scene.warnings.push_back(
           "`/field/eigenvalues`: the polariscope shows differences of principal values, which these change; \"auto\" "
           "keeps them");
+    if (settings().analyzer != 0 && !last_polarizer(arrangement_of(settings().arrangement).after))
+      scene.warnings.push_back("`/integrator/analyzer` has no effect: `after` has no polarizer that it could turn");
     scene.field.scale = 1;
     scene.bending.flexibility = {0, 0};  // Of the rays that the live view draws.
     if (scene.output.stokes && !scene.output.wants("spectral"))

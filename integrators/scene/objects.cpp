@@ -14,6 +14,7 @@ constexpr double dark_square = 0.12;  // Reflectance of a dark square, by that o
 constexpr double floor_below = 0.35;  // Distance of the default floor from the volume, in heights of the volume.
 constexpr double floor_size = 5;      // Its size, in the greatest horizontal extent of the volume.
 constexpr int floor_squares = 20;
+constexpr int roughness_steps = 33;  // Materials of a mesh that has a picture of roughness.
 
 ObjectDescription default_floor(const TensorField& field) {
   const Eigen::AlignedBox3d box = field.world_box();
@@ -54,6 +55,38 @@ SurfaceTexture picture(Plate plate, const PictureFile& file, const ColorManageme
   return texture;
 }
 
+/// The values of a picture as they are: they are no colours. Nothing if there is no file.
+MeshPictures::Picture values_of(const std::filesystem::path& file, std::vector<std::string>& notes) {
+  if (file.empty()) return {};
+  const NativeImage image = read_native_image(file);
+  add_notes(file, image, notes);
+  MeshPictures::Picture values{image.width, image.height, {}};
+  std::vector<float> rgba(4 * static_cast<std::size_t>(image.width));
+  for (int y = 0; y < image.height; ++y) {
+    read_pixels(image, 0, y, image.width, rgba.data());
+    for (std::size_t x = 0; x < rgba.size(); x += 4) values.pixels.emplace_back(rgba[x], rgba[x + 1], rgba[x + 2]);
+  }
+  return values;
+}
+
+/// @throw std::runtime_error if the file of the mesh has no places for its pictures.
+void load_pictures(const ObjectDescription& description, const ColorManagement& color, const ShownLight& light,
+                   std::vector<std::string>& notes, ShadedSurface& surface) {
+  MeshPictures pictures{
+      {}, values_of(description.roughness_texture, notes), values_of(description.normal_texture, notes)};
+  if (const auto* file = std::get_if<std::filesystem::path>(&description.texture)) {
+    SurfaceTexture colors = picture({}, {*file, description.texture_layer}, color, light.rec709_to_working, notes);
+    pictures.color = {colors.plate.resolution.x(), colors.plate.resolution.y(), std::move(colors.colors)};
+  }
+  if (pictures.roughness.width > 0) pictures.roughness_steps = roughness_steps;
+  if (pictures.color.width + pictures.roughness.width + pictures.normal.width == 0) return;
+  if (surface.places.empty())
+    throw std::runtime_error(description.file.string() +
+                             ": has no texture coordinates (u, v), which pictures need; "
+                             "unwrap it, and write it as .obj, .gltf, .glb, .dae or .fbx");
+  surface.pictures = std::make_shared<MeshPictures>(std::move(pictures));
+}
+
 Plate make_plate(const PlateDescription& description) {
   Plate plate;
   const Vector3d normal = description.normal.normalized();
@@ -80,7 +113,8 @@ SceneObject load_object(const ObjectDescription& description, const Scene& scene
     return object;
   }
   if (!description.plate) {
-    object.surface = read_mesh_surface(description.file, description.smooth_angle);
+    object.surface = read_mesh_surface(scene.description, description.file, description.smooth_angle);
+    load_pictures(description, scene.color, light, notes, object.surface);
     return object;
   }
   const Plate plate = make_plate(*description.plate);
@@ -107,7 +141,7 @@ std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescr
     objects.push_back(load_object(each, scene, tracing, lights.light, notes));
   for (const std::filesystem::path& file : scene.description.obstacles) {
     SceneObject obstacle;
-    obstacle.surface = read_mesh_surface(file);
+    obstacle.surface = read_mesh_surface(scene.description, file);
     objects.push_back(std::move(obstacle));
   }
   return objects;
@@ -132,7 +166,12 @@ void add_objects(const std::vector<SceneObject>& objects, const ShownLight& ligh
   for (const SceneObject& object : objects) {
     ShadedSurface surface = object.surface;
     surface.material = static_cast<int>(materials.size());
-    materials.push_back(load_material(object.material, light));
+    const int steps = surface.pictures ? surface.pictures->roughness_steps : 1;
+    for (int step = 0; step < steps; ++step) {
+      MaterialDescription material = object.material;
+      if (steps > 1) material.roughness = double(step) / (steps - 1);
+      materials.push_back(load_material(material, light));
+    }
     surfaces.push_back(std::move(surface));
   }
 }

@@ -233,6 +233,16 @@ class SceneMethod : public MethodWith<SceneMethodDescription> {
                        [](const ObjectDescription& object) { return object.paths.has_value(); });
   }
 
+  std::vector<std::string> channels(const SceneDescription& scene) const override {
+    return surface_channels(scene, true);
+  }
+
+  std::optional<Vector3d> view_through(const SceneDescription& scene, const Vector3d& middle) const override {
+    const CameraDescription& camera = scene.camera;
+    if (!camera.position) return camera.direction.value_or(Framing().direction);
+    return camera.target.value_or(middle) - *camera.position;
+  }
+
   std::vector<Output> outputs() const override { return picture_outputs({spectral_output()}); }
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override;
@@ -275,8 +285,9 @@ void SceneMethod::check(SceneDescription& scene, const Json& json, const SceneSo
   if (tracing.bands % settings().bands_per_sample != 0)
     source.fail(fmt::format("`/integrator/bands_per_sample` must divide `/integrator/bands` ({}), but is {}",
                             tracing.bands, settings().bands_per_sample));
-  check_memory(scene.camera.resolution.cast<double>().prod() * (340.0 + 20.0 * tracing.bands), "`/camera/resolution`",
-               source);
+  check_memory(scene.camera.resolution.cast<double>().prod() *
+                   (540.0 + (scene.output.wants("spectral") ? 20.0 * tracing.bands : 0)),
+               "`/camera/resolution`", source);
   check_photons(scene, tracing, source);
   const double picture = 1.0 * tracing.bands * settings().caustic.resolution * settings().caustic.resolution;
   check_memory(12 * picture, "`/integrator/caustic/resolution`", source);

@@ -111,6 +111,7 @@ IrradianceMap irradiance_map(const FlowIrradiance& landed, const LandingLight& l
   result.towards = -light.direction;
   result.bands = landed.irradiance.channels;
   result.folds = landed.folds;
+  result.straight = landed.straight;
   const std::size_t pixels = landed.irradiance.plane_size(), bands = strength.size();
   result.irradiance.resize(pixels * bands);
   for (std::size_t band = 0; band < bands; ++band) {

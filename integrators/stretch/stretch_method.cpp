@@ -144,6 +144,10 @@ class StretchMethod : public MethodWith<StretchKeys> {
  public:
   const char* name() const override { return "stretch"; }
 
+  std::vector<std::string> channels(const SceneDescription&) const override {
+    return channel_names(stretch_channels());
+  }
+
   std::vector<Output> outputs() const override {
     return picture_outputs({{"stretch", "the stretch in the volume, as a float grid", {".vdb"}, write_grids}});
   }

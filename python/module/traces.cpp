@@ -157,9 +157,14 @@ py::dict trace_for_python(const Field& field, const TraceRequest& request, int t
                          border == BorderChoice::extend ? Border::extend : Border::fade};
   choices.keeps_surface = value_of<BoundsChoice>("bounds", request.bounds) == BoundsChoice::automatic;
   choices.at_surface = border == BorderChoice::fade ? Border::fade : Border::extend;
+  std::vector<std::string> notes;
+  std::string eigenvalues;
   run(report, threads, [&](const Progress& progress) {
     progress.update("loading", 0, 1);
-    const TensorField bricks = field.loaded(choices).field;
+    const LoadedField loaded = field.loaded(choices);
+    const TensorField& bricks = loaded.field;
+    notes = loaded.notes;
+    eigenvalues = choice_name(loaded.eigenvalues.chosen);
     Surfaces surfaces;
     surfaces.bounds = box_mesh(bricks.index_bounds(), bricks.to_world());
     if (!bricks.surface().triangles.empty()) surfaces.cut = closed_surface(bricks.surface(), field.source());
@@ -167,7 +172,10 @@ py::dict trace_for_python(const Field& field, const TraceRequest& request, int t
     progress.update("tracing", 0, 1);
     trace_all(bricks, Geometry(std::move(surfaces)), bending, request.paths, batches, progress);
   });
-  return arrays_of(std::move(batches), request.flexibilities.size());
+  py::dict arrays = arrays_of(std::move(batches), request.flexibilities.size());
+  arrays["eigenvalues"] = eigenvalues;
+  arrays["notes"] = notes;
+  return arrays;
 }
 
 Plate plate_of(const Doubles& center, const Doubles& normal, const Doubles& up, const Doubles& size) {

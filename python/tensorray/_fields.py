@@ -167,8 +167,9 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
                 resolution: int | Sequence[int] | None = None, voxel_size: float | Sequence[float] | None = None,
                 levels: int | None = None, finest: float | None = None, error: float | str | None = None,
                 origin: Sequence[float] | None = None, bounds: Sequence[float] | None = None,
-                thickness: float | None = None, step: int | str | None = None, boundary: Path | None = None,
-                name: str | None = None, units: str | None = None, progress: Progress = None) -> Field:
+                mask: Path | None = None, thickness: float | None = None, step: int | str | None = None,
+                boundary: Path | None = None, name: str | None = None, units: str | None = None,
+                progress: Progress = None) -> Field:
     """Makes a field of other programs' files: VTK, XDMF, EnSight, ExodusII, CGNS, OpenFOAM, PLOT3D, NRRD, NIfTI,
     MetaImage, MRtrix, NumPy.
 
@@ -189,6 +190,7 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
     error        Refine where voxels differ from the mesh by more than this part of its peak: 0.01, "1%".
     origin       World (x, y, z) of the centre of the first voxel of a .npy file; default: (0, 0, 0).
     bounds       Crop: (xmin, xmax, ymin, ymax, zmin, zmax).
+    mask         A file of voxels with one number each: where it is 0, or does not reach, there is no tensor.
     thickness    Thickness of the slab that a flat mesh becomes; default: a typical edge of its cells.
     step         Step of time: a number from 1 on, "first" or "last" (the default).
     boundary     File.ply to write: the surface of the body that the mesh lies around, for `obstacles` of a scene.
@@ -205,8 +207,9 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
     options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of,
                "--viscous-stress-of": viscous_stress_of, "--cells": cells,
                "--order": order, "--frame": frame, "--resolution": resolution, "--voxel-size": voxel_size,
-               "--levels": levels, "--finest": finest, "--error": error, "--origin": origin, "--bounds": bounds, "--thickness": thickness, "--steps": step,
-               "--boundary": boundary, "--name": name, "--units": units}
+               "--levels": levels, "--finest": finest, "--error": error, "--origin": origin, "--bounds": bounds,
+               "--mask": mask, "--thickness": thickness, "--steps": step, "--boundary": boundary, "--name": name,
+               "--units": units}
     with tempfile.TemporaryDirectory() as folder:
         vdb = os.path.join(folder, "field.vdb")
         command = [program, "--tell-progress", "-q", "-o", vdb, *["--negate"] * negate]
@@ -225,9 +228,23 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
         return Field._of(_tensorray.read_field(vdb, keys, "", "none", None), keys)
 
 
+def imported(scene, field, choices, progress):
+    """The scene and the field to take, where the scene may be a file, or a list of files, for import_file."""
+    files = scene if isinstance(scene, (list, tuple)) else [scene]
+    if isinstance(scene, (list, tuple)) or isinstance(scene, (str, os.PathLike)) and needs_import(scene):
+        if field is not None:
+            raise ValueError("field: the scene is a file that is imported as one; give one of them")
+        return None, import_file(*files, **choices, progress=progress)
+    if choices:
+        raise ValueError(f"imports: only files that have to be imported have these choices: {', '.join(choices)}")
+    return scene, field
+
+
 def needs_import(file):
     """Whether a file is neither a scene, which begins with "{" or a comment, nor an OpenVDB file."""
     name = os.fspath(file)
+    if os.path.isdir(name):  # A case of OpenFOAM.
+        return True
     if name.endswith(".vdb") or name.lower().endswith(".json") or not os.path.isfile(name):
         return False
     with open(name, "rb") as stream:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import _shards, _tensorray
 from ._arguments import Changes, Executor, Path, Progress, Scene, request_of
-from ._fields import Field, import_file, needs_import
+from ._fields import Field, imported
 from ._progress import shown
 
 _PHOTON = np.dtype([("position", "f4", 3), ("direction", "f4", 3), ("origin", "f4", 3), ("wavelength", "f4"),
@@ -23,14 +23,14 @@ _PHOTON = np.dtype([("position", "f4", 3), ("direction", "f4", 3), ("origin", "f
 
 def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: Path | Sequence[Path] = (),
            keep: str | Sequence[str] = (), changes: Changes = None, frame: int | None = None, seed: int | None = None,
-           threads: int = 0, folder: Path | None = None, imports: Mapping[str, Any] | None = None,
-           shards: int | None = None, executor: Executor | None = None, shard_folder: Path | None = None,
-           progress: Progress = None) -> Render:
+           threads: int = 0, folder: Path | None = None, smooth: float | None = None,
+           imports: Mapping[str, Any] | None = None, shards: int | None = None, executor: Executor | None = None,
+           shard_folder: Path | None = None, progress: Progress = None, **choices: Any) -> Render:
     """Renders a scene, as `tensorray render` does.
 
     scene     A dictionary with the keys of a scene file (docs/scenes.md, tr.schema()), or the name of a scene file, of
-              a field's file (.vdb) or of any file that tr.import_file reads. None: the light that `field` bends, on a
-              plate.
+              a field's file (.vdb) or of any file that tr.import_file reads; a list or tuple of names: files of one
+              import. None: the light that `field` bends, on a plate.
     field     A Field, instead of the scene's own `field.file` or `field.generate`. Other keys of the scene's `field`
               (scale, smooth, eigenvalues, bounds) stay.
     outputs   Names of files to write: their endings say what they hold, as with -o. The bytes are those that the
@@ -41,7 +41,9 @@ def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: 
     seed      Seed of all random numbers; None: the scene's.
     threads   Greatest number of threads, of each shard if there are such; 0: all. The result does not depend on it.
     folder    Relative paths in a dictionary are relative to this folder; None: the working folder.
-    imports   Arguments of tr.import_file, if `scene` is a file for it, as {"array": "stress", "order": "vtk"}.
+    smooth    Deviation of the Gaussian that smooths the field first, voxels; None: the scene's `field.smooth`.
+    choices   Arguments of tr.import_file, if `scene` is a file for it: tr.render("plate.vtu", order="vtk"). `imports`
+              is a dictionary of them.
     shards    Number of parts that the work is divided into, as by --shard of the command line; None: it is not divided.
               The result has the same bits.
     executor  What makes the shards: an object whose `submit` returns futures, as a ProcessPoolExecutor or Dask's
@@ -57,12 +59,9 @@ def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: 
         raise ValueError("executor, shard_folder: give the number of shards, too, as shards=4")
     if isinstance(scene, Field) and field is None:
         scene, field = None, scene
-    if isinstance(scene, (str, os.PathLike)) and needs_import(scene):
-        if field is not None:
-            raise ValueError("field: the scene is a file that is imported as one; give one of them")
-        scene, field = None, import_file(scene, **(imports or {}), progress=progress)
-    elif imports:
-        raise ValueError("imports: only files that have to be imported have these choices")
+    scene, field = imported(scene, field, {**(imports or {}), **choices}, progress)
+    if smooth is not None:
+        changes = {**(changes or {}), "field.smooth": smooth}
     files = [outputs] if isinstance(outputs, (str, os.PathLike)) else outputs
     arguments = {"function": "render", "scene": scene, "field": field, "changes": changes, "frame": frame,
                  "folder": folder, "seed": seed, "outputs": [os.fspath(name) for name in files],

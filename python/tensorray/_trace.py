@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _tensorray
 from ._arguments import Changes, Eigenvalues, Method, Path, Progress, Scene, module_field, request_of
-from ._fields import Field
+from ._fields import Field, imported
 from ._progress import shown
 
 
@@ -41,6 +42,8 @@ class Trace:
     position_jacobians: NDArray[np.float64] | None = None  #: Derivatives of `positions` along them: (n, 3, 2).
     direction_jacobians: NDArray[np.float64] | None = None  #: Derivatives of `directions` along them: (n, 3, 2).
     ways: list[NDArray[np.float64]] | None = None  #: A polyline a ray: a list of arrays (points, 3).
+    eigenvalues: str = "raw"  #: How the field's were preprocessed: what "auto" has chosen.
+    notes: list[str] = dataclasses.field(default_factory=list)  #: What was found while loading, one line each.
 
     @property
     def landed(self) -> NDArray[np.bool_]:
@@ -70,7 +73,8 @@ def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLik
     step         Voxels a step; None: chosen along the ray.
     max_steps    Steps after which a ray is given up.
     max_length   Length after which a ray ends, world units; None: no limit.
-    eigenvalues  Preprocessing: auto (absolute where the field is symmetric, else raw), raw, absolute or positive.
+    eigenvalues  Preprocessing: auto (absolute where the field is symmetric, else raw; it is printed which), raw, absolute
+                 or positive.
     smooth       Standard deviation of a Gaussian that smooths the field first, voxels; 0: none.
     interpolation
                  What the field is between its voxels: cubic (smooth) or linear.
@@ -94,7 +98,10 @@ def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLik
         float(smooth), method, float(scale), float(step or 0), int(max_steps),
         math.inf if max_length is None else float(max_length), ways)
     with shown(progress) as report:
-        return Trace(**_tensorray.trace(module_field("trace", field), request, threads, report), along=along)
+        traced = Trace(**_tensorray.trace(module_field("trace", field), request, threads, report), along=along)
+    if eigenvalues == "auto" and progress is not False:
+        print(f"trace: eigenvalues {traced.eigenvalues}", file=sys.stderr)
+    return traced
 
 
 def _rays(positions, directions, s):
@@ -151,15 +158,16 @@ class Landings:
 
 def landings(scene: Scene = None, field: Field | None = None, s: ArrayLike | None = None, *, tolerance: float = 0.5,
              changes: Changes = None, frame: int | None = None, threads: int = 0, folder: Path | None = None,
-             progress: Progress = None) -> Landings:
+             progress: Progress = None, **choices: Any) -> Landings:
     """Where the light of a scene lands on its plate: the map whose light `photon_distribution` draws.
 
-    scene, field, changes, frame, threads, folder, progress    As those of `render`.
+    scene, field, changes, frame, threads, folder, progress, choices    As those of `render`.
     s          Flexibilities: a number or several. None: those of the scene's light, evenly spaced between its ends.
     tolerance  Wanted error of landings between starts, pixels. Where the map bends or folds, starts are closer.
 
     Returns Landings.
     """
+    scene, field = imported(scene, field, choices, progress)
     request = request_of("landings", scene, field, changes=changes, frame=frame, folder=folder)
     flexibilities = [] if s is None else [float(value) for value in np.atleast_1d(s)]
     if not np.isfinite(flexibilities).all():

@@ -39,22 +39,23 @@ void require_valid(const Camera& camera, const PathTracerSettings& settings) {
           "first_samples must be 1 to min_samples");
 }
 
-/// Sets the means of a pixel's bands after `samples` more of `count` samples.
+/// Sets the means of a pixel's light after `samples` more of `count` samples.
 void extend_means(const BandsIn& sum, int samples, double count, double* means) {
-  for (Eigen::Index band = 0; band < sum.size(); ++band) means[band] += (sum[band] - samples * means[band]) / count;
+  for (Eigen::Index i = 0; i < sum.size(); ++i) means[i] += (sum[i] - samples * means[i]) / count;
 }
 
 /// A square of the picture: a unit of the work.
 struct Tile {
   int left, top, width, height;  ///< In the picture.
-  std::size_t light_values;      ///< Numbers of light for each pixel.
+  std::size_t color_values;      ///< Numbers of light for each pixel: red, green and blue of all of it, and of layers.
+  std::size_t band_values;       ///< The same of all bands; 0: they are not kept.
   std::vector<PixelState> pixels = std::vector<PixelState>(static_cast<std::size_t>(width) * height);  ///< Row by row.
-  /// Means of each pixel's bands; then of red, green and blue of each layer.
-  std::vector<double> light = std::vector<double>(pixels.size() * light_values);
+  std::vector<double> colors = std::vector<double>(pixels.size() * color_values);  ///< Means of each pixel's samples.
+  std::vector<double> bands = std::vector<double>(pixels.size() * band_values);
   bool is_done = false;  ///< Whether it gets no more samples.
 
-  PixelState& pixel(int x, int y) { return pixels[static_cast<std::size_t>(y) * width + x]; }
-  double* light_of(int x, int y) { return &light[(static_cast<std::size_t>(y) * width + x) * light_values]; }
+  PixelState& pixel(int x, int y) { return pixels[index(x, y)]; }
+  std::size_t index(int x, int y) const { return static_cast<std::size_t>(y) * width + x; }
 
   /// The samples of pixels that are not done.
   int samples() const {
@@ -63,27 +64,35 @@ struct Tile {
     return most;
   }
 
-  /// To bytes or from them. @throw DamagedArchive if there are not so many.
-  void copy(Archive& archive) {
-    std::uint64_t done = is_done;
+  /// To bytes or from them, which may have bands that this one does without. @return whether they have all that it
+  /// needs. @throw DamagedArchive.
+  bool copy(Archive& archive) {
+    std::uint64_t done = is_done, kept_bands = band_values;
     archive.copy(done);
-    archive.copy(pixels.data(), pixels.size() * sizeof pixels[0]);
-    archive.copy(light.data(), light.size() * sizeof light[0]);
+    archive.copy(kept_bands);
+    archive.copy_packed(pixels.data(), pixels.size(), sizeof pixels[0]);
+    archive.copy_packed(colors.data(), pixels.size(), color_values * sizeof colors[0]);
+    std::string skipped;
+    if (kept_bands > 0 && band_values == 0) archive.copy_list(skipped);
+    if (kept_bands > 0 && band_values > 0)
+      archive.copy_packed(bands.data(), pixels.size(), band_values * sizeof bands[0]);
     is_done = done != 0;
+    return kept_bands > 0 || band_values == 0;
   }
 };
 
 void add_tile(const Tile& tile, SurfacePicture& picture) {
   for (std::size_t i = 0; i < tile.pixels.size(); ++i) {
     const int x = tile.left + static_cast<int>(i) % tile.width, y = tile.top + static_cast<int>(i) / tile.width;
-    const std::size_t index = static_cast<std::size_t>(y) * picture.radiance.width + x;
-    const double* light = &tile.light[i * tile.light_values];
-    for (Film* film : {&picture.radiance, &picture.landed, &picture.groups})
-      for (int channel = 0; channel < film->channels; ++channel) film->plane(channel)[index] = *light++;
+    const std::size_t index = static_cast<std::size_t>(y) * picture.color.width + x;
+    const double *color = tile.colors.data() + i * tile.color_values, *band = tile.bands.data() + i * tile.band_values;
+    for (Film* film : {&picture.color, &picture.landed, &picture.groups})
+      for (int channel = 0; channel < film->channels; ++channel) film->plane(channel)[index] = *color++;
+    for (int channel = 0; channel < picture.radiance.channels; ++channel)
+      picture.radiance.plane(channel)[index] = *band++;
     picture.pixels[index] = tile.pixels[i];
   }
 }
-
 std::string name_of(std::size_t tile) { return "tile " + std::to_string(tile); }
 
 struct TileLists {
@@ -106,7 +115,7 @@ class Rendering {
         height_(camera.resolution.y()),
         columns_((width_ + tile_size - 1) / tile_size),
         tiles_(static_cast<std::size_t>(columns_) * ((height_ + tile_size - 1) / tile_size)),
-        light_values_(scene.colors.bands() + 3 * static_cast<std::size_t>(scene.layers())) {
+        band_values_(settings.spectral || job.is_shard ? static_cast<std::size_t>(scene.colors.bands()) : 0) {
     for (std::size_t number = 0; number < tiles_; ++number)
       if (job.has(number)) lists_.part.push_back(number);
   }
@@ -132,17 +141,23 @@ class Rendering {
     Eigen::ArrayXXd sum;            // Of one pixel's samples: radiance and layers.
   };
 
-  /// A tile as it is kept. @throw DamagedArchive.
+  /// A tile as it is kept; without samples if what is kept lacks bands that are wanted now. @throw DamagedArchive.
   Tile load(std::size_t number) const {
     const int left = static_cast<int>(number) % columns_ * tile_size,
               top = static_cast<int>(number) / columns_ * tile_size;
-    Tile tile{left, top, std::min(tile_size, width_ - left), std::min(tile_size, height_ - top), light_values_};
-    if (const Result kept = job_.find(name_of(number))) {
-      Archive archive(*kept);
-      tile.copy(archive);
-      archive.finish();
-    }
-    return tile;
+    const Tile empty{left,
+                     top,
+                     std::min(tile_size, width_ - left),
+                     std::min(tile_size, height_ - top),
+                     3 + 3 * static_cast<std::size_t>(scene_.layers()),
+                     band_values_};
+    const Result kept = job_.find(name_of(number));
+    if (!kept) return empty;
+    Tile tile = empty;
+    Archive archive(*kept);
+    const bool has_all = tile.copy(archive);
+    archive.finish();
+    return has_all ? tile : empty;
   }
 
   /// Ranks render every so many tiles of the part: others in each row of tiles.
@@ -325,11 +340,13 @@ class Rendering {
 
   void add_light(Tile& tile, int x, int y, int samples, Batch& batch) const {
     const int count = tile.pixel(x, y).samples;
-    double* light = tile.light_of(x, y);
-    extend_means(batch.sum.col(0), samples, count, light);
-    light += batch.sum.rows();
-    for (int layer = 0; layer < scene_.layers(); ++layer, light += 3)
-      extend_means(scene_.colors.color(batch.sum.col(1 + layer)).cast<double>().array(), samples, count, light);
+    double* color = &tile.colors[tile.index(x, y) * tile.color_values];
+    extend_means(scene_.colors.color(batch.sum.col(0)).array(), samples, count, color);
+    for (int layer = 1; layer <= scene_.layers(); ++layer) {  // In single precision, as `albedo`.
+      const Eigen::Vector3f sum = scene_.colors.color(batch.sum.col(layer)).cast<float>();
+      extend_means(sum.cast<double>().array(), samples, count, color + 3 * layer);
+    }
+    if (band_values_ > 0) extend_means(batch.sum.col(0), samples, count, &tile.bands[tile.index(x, y) * band_values_]);
     batch.sum.setZero();
   }
 
@@ -398,10 +415,11 @@ class Rendering {
 
   SurfacePicture picture() const {
     SurfacePicture picture;
-    picture.radiance = Film(width_, height_, static_cast<int>(scene_.colors.bands()));
+    picture.color = Film(width_, height_, 3);
+    if (settings_.spectral) picture.radiance = Film(width_, height_, static_cast<int>(scene_.colors.bands()));
     if (scene_.has_traced_light()) picture.landed = Film(width_, height_, 3);
     if (scene_.groups > 0) picture.groups = Film(width_, height_, 3 * scene_.groups);
-    picture.pixels.resize(picture.radiance.plane_size());
+    picture.pixels.resize(picture.color.plane_size());
     picture.transparent = settings_.transparent;
     picture.bends = scene_.region != nullptr;
     for (std::size_t number = 0; number < tiles_; ++number) add_tile(load(number), picture);
@@ -415,8 +433,8 @@ class Rendering {
   Job& job_;
   const int width_, height_, columns_;  ///< Columns of tiles.
   const std::size_t tiles_;
-  const std::size_t light_values_;  ///< For each pixel.
-  double floor_ = 0;                ///< Least luminance to which errors are compared.
+  const std::size_t band_values_;  ///< Of a tile.
+  double floor_ = 0;               ///< Least luminance to which errors are compared.
   Clock::time_point start_ = Clock::now();
   TileLists lists_;
   std::uint64_t total_samples_ = 0;

@@ -39,6 +39,8 @@ struct PathTracerSettings {
   double max_seconds = std::numeric_limits<double>::infinity();
   int first_samples = 1;  ///< 1 to min_samples.
 
+  bool spectral = true;  ///< Whether the picture has the light of each band, and not its colours alone.
+
   std::uint64_t seed = 0;
 };
 
@@ -94,9 +96,9 @@ static_assert(sizeof(PixelState) == 136 && std::is_trivially_copyable_v<PixelSta
 
 /// Light and pixels, row by row from the top. Light is the mean over the samples of a pixel.
 struct SurfacePicture {
-  Film radiance;  ///< One channel for each band; multiplied by alpha if the picture is transparent.
-  Film landed;    ///< The part of `radiance` that ShadedScene::irradiance_maps has lit, in the working space; empty if
-                  ///< none has.
+  Film color;     ///< In the working space; multiplied by alpha if the picture is transparent.
+  Film radiance;  ///< The same with one channel for each band; empty unless PathTracerSettings::spectral.
+  Film landed;    ///< The part of `color` that ShadedScene::irradiance_maps has lit, empty if none has.
   Film groups;    ///< The part of each group of lights: red, green, blue of the first, then of the next. May be empty.
   std::vector<PixelState> pixels;
   bool transparent = false, bends = false;  ///< As PathTracerSettings::transparent; whether the scene has a region.

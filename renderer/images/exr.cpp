@@ -93,6 +93,21 @@ Imf::Header header_of(const Image& image, const ImageMetadata& metadata) {
   return header;
 }
 
+/// Colours and normals; not depths, numbers, lengths, and places in textures, which need more digits than halves have.
+bool may_be_half(const std::string& channel) {
+  const std::string end = channel.substr(channel.rfind('.') + 1);
+  const bool is_normal = end != channel && (end == "X" || end == "Y" || end == "Z");
+  return is_normal || end == "R" || end == "G" || end == "B" || channel == "A";
+}
+
+std::vector<half> halves_of(const Image& image, std::size_t channel) {
+  constexpr auto most = static_cast<float>(HALF_MAX);
+  std::vector<half> values;
+  for (std::size_t i = channel; i < image.pixels.size(); i += image.channels.size())
+    values.emplace_back(std::clamp(image.pixels[i], -most, most));
+  return values;
+}
+
 /// OpenImageIO, which reads with the same pool, sets the same number (renderer/openimageio/picture_files.cpp).
 void set_pool(int threads) {
   const int all = static_cast<int>(std::thread::hardware_concurrency());
@@ -149,7 +164,15 @@ std::vector<unsigned char> encode_exr(const Image& image, const ImageMetadata& m
     Imf::FrameBuffer channels;
     const std::vector<std::string> names = distinct_names(image.channels);
     const std::size_t pixel_bytes = names.size() * sizeof(float);
+    std::vector<std::vector<half>> halves(names.size());
     for (std::size_t c = 0; c < names.size(); ++c) {
+      if (image.has_half_colors && may_be_half(names[c])) {
+        halves[c] = halves_of(image, c);
+        header.channels().insert(names[c], Imf::Channel(Imf::HALF));
+        channels.insert(names[c], Imf::Slice(Imf::HALF, reinterpret_cast<char*>(halves[c].data()), sizeof(half),
+                                             sizeof(half) * image.width));
+        continue;
+      }
       header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
       char* const first = reinterpret_cast<char*>(const_cast<float*>(&image.pixels[c]));  // It is only read.
       channels.insert(names[c], Imf::Slice(Imf::FLOAT, first, pixel_bytes, pixel_bytes * image.width));

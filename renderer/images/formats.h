@@ -16,8 +16,8 @@ namespace tensorray {
 
 // EXR and PNG are written without OpenImageIO, which takes longer to load than a small render takes.
 
-/// An EXR of rows with all channels as 32-bit floats, ZIP-compressed. The file has the channels in alphabetical order.
-/// Any number of threads may call it at once, with the same `threads`.
+/// An EXR of rows with all channels as 32-bit floats (but half colours), ZIP-compressed. The file has the channels in
+/// alphabetical order. Any number of threads may call it at once, with the same `threads`.
 /// @param image     At least one pixel and one channel; any values. Names of channels that are empty, or equal in their
 ///                  first 255 characters (the format's limit), become "channel" and the channel's number.
 /// @param metadata  All becomes text, with ImageDescription as `comments` and Copyright as `owner`; names that mean

@@ -157,6 +157,11 @@ std::size_t non_finite_pixels(const NativeImage& image) {
 
 }  // namespace
 
+std::string layer_of(const std::string& channel) {
+  const bool is_picture = channel == "R" || channel == "G" || channel == "B" || channel == "A";
+  return is_picture ? "" : channel.substr(0, channel.find('.'));
+}
+
 std::vector<std::string> image_endings() { return {".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff"}; }
 
 bool holds_alpha(const std::filesystem::path& path) { return find_format(path).alpha; }

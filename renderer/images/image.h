@@ -20,6 +20,7 @@ struct Image {
   int height = 0;
   std::vector<std::string> channels;  ///< Names: "R", "G", "B", "A", "Z", "S0.550,000000nm" ...
   std::vector<float> pixels;          ///< width * height * channels.size()
+  bool has_half_colors = false;       ///< An EXR has colours and normals as 16-bit floats, at most ±65504.
 
   Image() = default;
   Image(int width_, int height_, std::vector<std::string> channels_)
@@ -39,6 +40,9 @@ inline bool begins_with_rgb(const Image& image) {
   return names.size() >= 3 && names[0] == "R" && names[1] == "G" && names[2] == "B";
 }
 
+/// The layer of a channel: "normal" of "normal.X", "Z" of "Z"; empty: R, G, B or A of the picture itself.
+std::string layer_of(const std::string& channel);
+
 /// Whether files with the ending of `path` can store alpha. Colours are then not multiplied by it (but in EXR).
 bool holds_alpha(const std::filesystem::path& path);
 
@@ -57,7 +61,8 @@ void set_image_threads(int threads);
 void prepare_images(const std::vector<std::filesystem::path>& files);
 
 /// Writes a picture in the format given by the ending of `path`. The same picture always gives the same bytes.
-/// - EXR: all channels as 32-bit floats, ZIP-compressed, with unchanged values and names; all metadata.
+/// - EXR: all channels as 32-bit floats unless the picture has half colours, ZIP-compressed, with unchanged values and
+/// names; all metadata.
 /// - PNG: 16 bits, all metadata. TIFF: 16 bits. JPEG: 8 bits, quality 95. TIFF and JPEG store only the metadata
 ///   ImageDescription, Software, Artist and Copyright.
 /// All formats except EXR take the values as display-referred and clip them to [0, 1] (NaN: 0). PNG and JPEG are marked

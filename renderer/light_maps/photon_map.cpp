@@ -24,6 +24,23 @@ Vector3d place_of(const IrradianceMap& light, const Vector3d& point) {
   return projected_from(*light.source, light.plate, point);
 }
 
+/// Calls `use(pixel, weight)` for the pixels about a place on the plate, for linear interpolation. Beyond the centres
+/// of the outermost pixels, these alone count. @return false beside the plate.
+template <class Use>
+bool interpolate(const Plate& plate, const Vector3d& place, const Use& use) {
+  const Eigen::Array2d at = plate.to_pixel(place), size = plate.resolution.cast<double>();
+  if (!((at > -rounding).all() && (at < size + rounding).all())) return false;
+  const Eigen::Array2d between = (at - 0.5).max(0).min(size - 1), corner = between.floor(), part = between - corner;
+  for (int j = 0; j < 2; ++j)
+    for (int i = 0; i < 2; ++i) {
+      const int x = static_cast<int>(corner.x()) + i, y = static_cast<int>(corner.y()) + j;
+      const double weight = (i == 1 ? part.x() : 1 - part.x()) * (j == 1 ? part.y() : 1 - part.y());
+      if (weight > 0)
+        use(static_cast<std::size_t>(y) * static_cast<std::size_t>(size.x()) + static_cast<std::size_t>(x), weight);
+    }
+  return true;
+}
+
 }  // namespace
 
 double photon_radius(double first, int pass) {
@@ -98,25 +115,25 @@ bool is_lit(const IrradianceMap& light, const Vector3d& point, const Vector3d& r
 
 void add_irradiance(const IrradianceMap& light, const Vector3d& point, Eigen::ArrayXd& sum, Eigen::Index first_band) {
   const Vector3d place = place_of(light, point);
-  const Eigen::Array2d at = light.plate.to_pixel(place), size = light.plate.resolution.cast<double>();
-  if (!((at > -rounding).all() && (at < size + rounding).all())) return;
-  // Beyond the centres of the outermost pixels, these alone count.
-  const Eigen::Array2d between = (at - 0.5).max(0).min(size - 1), corner = between.floor(), part = between - corner;
   double radiance_scale = 1;
   if (light.body && light.source) {  // From the plate to a surface at the point that faces the light.
     const Vector3d to_plate = place - *light.source;
     const double cosine = std::abs(light.plate.normal().dot(to_plate)) / to_plate.norm();
     radiance_scale = to_plate.squaredNorm() / ((point - *light.source).squaredNorm() * cosine);
   }
-  for (int j = 0; j < 2; ++j)
-    for (int i = 0; i < 2; ++i) {
-      const int x = static_cast<int>(corner.x()) + i, y = static_cast<int>(corner.y()) + j;
-      const double weight = (i == 1 ? part.x() : 1 - part.x()) * (j == 1 ? part.y() : 1 - part.y());
-      if (!(weight > 0)) continue;
-      const Eigen::Index pixel = static_cast<Eigen::Index>(y) * light.plate.resolution.x() + x;
-      const float* const irradiance = light.irradiance.data() + pixel * light.bands + first_band;
-      sum += radiance_scale * weight * Eigen::Map<const Eigen::ArrayXf>(irradiance, sum.size()).cast<double>();
-    }
+  interpolate(light.plate, place, [&](std::size_t pixel, double weight) {
+    const float* const irradiance =
+        light.irradiance.data() + static_cast<Eigen::Index>(pixel) * light.bands + first_band;
+    sum += radiance_scale * weight * Eigen::Map<const Eigen::ArrayXf>(irradiance, sum.size()).cast<double>();
+  });
+}
+
+std::optional<double> straight_at(const IrradianceMap& light, const Vector3d& point) {
+  if (light.straight.empty()) return std::nullopt;
+  double sum = 0;
+  const bool is_there = interpolate(light.plate, place_of(light, point),
+                                    [&](std::size_t pixel, double weight) { sum += weight * light.straight[pixel]; });
+  return is_there ? std::optional(sum) : std::nullopt;
 }
 
 float folds_at(const IrradianceMap& light, const Vector3d& point) {

@@ -138,7 +138,10 @@ struct IrradianceMap {
   Eigen::Vector3d towards = Eigen::Vector3d::UnitZ();  ///< Unit; from the surface to a distant light, on the lit side.
   Eigen::Index bands = 0;
   std::vector<float> irradiance;  ///< On `plate`, in every band, pixel after pixel.
-  std::vector<float> folds;       ///< On `plate`: the number of sheets of light that lie on each other.
+  /// On `plate`: the part of each pixel whose straight light comes through the region; instead of it, there is this
+  /// map. Empty: whether it does is asked at each point, which leaves a seam where the map's pixels are large.
+  std::vector<float> straight;
+  std::vector<float> folds;  ///< On `plate`: the number of sheets of light that lie on each other.
 };
 
 /// Light that grazes a plate straight may come from above it when it is bent: it counts as if it came from above.
@@ -149,6 +152,9 @@ Eigen::Vector3d direction_towards(const IrradianceMap& light, const Eigen::Vecto
 
 /// Whether a point of the surface may have this light. @param ray  Direction of the ray that found the point.
 bool is_lit(const IrradianceMap& light, const Eigen::Vector3d& point, const Eigen::Vector3d& ray);
+
+/// `straight` at a point of the surface, as smooth as the irradiance; nothing beside the map.
+std::optional<double> straight_at(const IrradianceMap& light, const Eigen::Vector3d& point);
 
 /// The number of sheets at a point of the surface; 0 where there is no light.
 float folds_at(const IrradianceMap& light, const Eigen::Vector3d& point);

@@ -25,8 +25,8 @@ class ReflectanceTable {
   void reflectance(const Eigen::Vector3f& color, BandsOut reflectance, Eigen::Index first_band = 0) const;
 
   /// The colour, in the working space, of the values of all bands.
-  Eigen::Vector3f color(const BandsIn& values) const {
-    return Eigen::Vector4d(colors_.lazyProduct(values.matrix())).head<3>().cast<float>();
+  Eigen::Vector3d color(const BandsIn& values) const {
+    return Eigen::Vector4d(colors_.lazyProduct(values.matrix())).head<3>();
   }
 
   /// The luminance (Y) of the values of all bands.

@@ -68,6 +68,9 @@ void add_mesh(const aiMesh& part, const Eigen::Affine3d& to_world, MeshWithNorma
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();
     if (part.HasNormals()) normal = Eigen::Vector3d(part.mNormals[i].x, part.mNormals[i].y, part.mNormals[i].z);
     result.normals.push_back((turn * normal).stableNormalized().cast<float>());
+    if (!part.HasTextureCoords(0)) continue;
+    result.places.resize(result.normals.size() - 1, Eigen::Vector2f::Zero());  // Of parts that have none.
+    result.places.emplace_back(part.mTextureCoords[0][i].x, part.mTextureCoords[0][i].y);
   }
   for (unsigned i = 0; i < part.mNumFaces; ++i) {
     check_face(part, part.mFaces[i]);
@@ -180,6 +183,7 @@ MeshWithNormals import(const std::filesystem::path& path) {
   if (!scene) throw std::runtime_error(one_line(error));
   MeshWithNormals mesh;
   if (scene->mRootNode) add_node(*scene, *scene->mRootNode, to_world(*scene, ending), mesh);
+  if (!mesh.places.empty()) mesh.places.resize(mesh.mesh.vertices.size(), Eigen::Vector2f::Zero());
   return mesh;
 }
 
@@ -207,6 +211,7 @@ MeshWithNormals read_exchanged(const std::filesystem::path& exchange) {
   mesh.mesh.vertices = read_values<Eigen::Vector3d>(file);
   mesh.mesh.triangles = read_values<Triangle>(file);
   mesh.normals = read_values<Eigen::Vector3f>(file);
+  mesh.places = read_values<Eigen::Vector2f>(file);
   return mesh;
 }
 
@@ -235,6 +240,7 @@ void write_assimp_mesh(const std::filesystem::path& path, const std::filesystem:
   write_values(file, mesh.mesh.vertices);
   write_values(file, mesh.mesh.triangles);
   write_values(file, mesh.normals);
+  write_values(file, mesh.places);
   if (!file.flush()) throw std::runtime_error("its triangles cannot be written to the temporary folder; is it full?");
 }
 

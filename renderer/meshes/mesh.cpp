@@ -18,8 +18,8 @@ namespace tensorray {
 namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
-/// What tells vertices apart: a position, and a normal, or zero.
-using VertexKey = std::array<double, 6>;
+/// What tells vertices apart: a position; a normal and a place, or zero.
+using VertexKey = std::array<double, 8>;
 
 struct VertexHash {
   std::size_t operator()(const VertexKey& key) const {
@@ -31,9 +31,9 @@ struct VertexHash {
 
 VertexKey key_of(const MeshWithNormals& mesh, std::uint32_t vertex) {
   const Eigen::Vector3d& P = mesh.mesh.vertices[vertex];
-  if (mesh.normals.empty()) return {P.x(), P.y(), P.z(), 0, 0, 0};
-  const Eigen::Vector3f& N = mesh.normals[vertex];
-  return {P.x(), P.y(), P.z(), N.x(), N.y(), N.z()};
+  const Eigen::Vector3f N = mesh.normals.empty() ? Eigen::Vector3f::Zero() : mesh.normals[vertex];
+  const Eigen::Vector2f place = mesh.places.empty() ? Eigen::Vector2f::Zero() : mesh.places[vertex];
+  return {P.x(), P.y(), P.z(), N.x(), N.y(), N.z(), place.x(), place.y()};
 }
 
 /// Joins equal vertices, which files often repeat. Drops triangles of zero area and vertices that no triangle uses.
@@ -46,6 +46,7 @@ MeshWithNormals without_repeats(const MeshWithNormals& given) {
     if (!is_new) return entry->second;
     result.mesh.vertices.push_back(given.mesh.vertices[index]);
     if (!given.normals.empty()) result.normals.push_back(given.normals[index]);
+    if (!given.places.empty()) result.places.push_back(given.places[index]);
     return entry->second;
   };
   for (const Triangle& t : given.mesh.triangles) {
@@ -57,16 +58,24 @@ MeshWithNormals without_repeats(const MeshWithNormals& given) {
   return result;
 }
 
-MeshWithNormals read_any(const std::filesystem::path& path) {
-  const std::string ending = lower_case_ending(path);
+MeshWithNormals read_axisless(const std::filesystem::path& path, const std::string& ending) {
   if (ending == ".ply") return read_ply(path);
   if (ending == ".obj") return read_obj(path);
-  const std::vector<std::string> others{".stl", ".off", ".gltf", ".glb", ".dae", ".fbx"};
-  if (std::find(others.begin(), others.end(), ending) == others.end())
-    throw std::runtime_error("a mesh is a .ply, .obj, " + joined(others) +
-                             " file; convert other formats to one of these, for example with Blender");
   MeshWithNormals mesh = read_assimp_mesh(path);
   if (ending == ".stl") mesh.normals.clear();  // They are those of the triangles.
+  return mesh;
+}
+
+MeshWithNormals read_any(const std::filesystem::path& path, const Eigen::Matrix3d& turn) {
+  const std::string ending = lower_case_ending(path);
+  const std::vector<std::string> with_axes{".gltf", ".glb", ".dae", ".fbx"}, others{".ply", ".obj", ".stl", ".off"};
+  if (std::find(with_axes.begin(), with_axes.end(), ending) != with_axes.end()) return read_assimp_mesh(path);
+  if (std::find(others.begin(), others.end(), ending) == others.end())
+    throw std::runtime_error("a mesh is a .ply, .obj, .stl, .off, " + joined(with_axes) +
+                             " file; convert other formats to one of these, for example with Blender");
+  MeshWithNormals mesh = read_axisless(path, ending);
+  for (Eigen::Vector3d& vertex : mesh.mesh.vertices) vertex = turn * vertex;
+  for (Eigen::Vector3f& normal : mesh.normals) normal = turn.cast<float>() * normal;
   return mesh;
 }
 
@@ -74,6 +83,8 @@ void check_finite(const MeshWithNormals& mesh) {
   for (std::size_t i = 0; i < mesh.mesh.vertices.size(); ++i)
     if (!mesh.mesh.vertices[i].cast<float>().allFinite())
       throw std::runtime_error("vertex " + std::to_string(i) + " is not finite in single precision");
+  for (const Eigen::Vector2f& place : mesh.places)
+    if (!place.allFinite()) throw std::runtime_error("a texture coordinate is not finite");
   for (std::size_t i = 0; i < mesh.normals.size(); ++i)
     if (!mesh.normals[i].allFinite())
       throw std::runtime_error("the normal of vertex " + std::to_string(i) + " is not finite");
@@ -90,13 +101,38 @@ auto naming(const std::filesystem::path& path, const Make& make) {
   }
 }
 
-MeshWithNormals read_joined(const std::filesystem::path& path, bool normals) {
-  MeshWithNormals raw = read_any(path);
+MeshWithNormals read_finite(const std::filesystem::path& path, const Eigen::Matrix3d& turn) {
+  MeshWithNormals raw = read_any(path, turn);
   check_finite(raw);
-  if (!normals) raw.normals.clear();
+  return raw;
+}
+
+/// @param attributes  Whether vertices have normals and places.
+MeshWithNormals joined_vertices(MeshWithNormals raw, bool attributes) {
+  if (!attributes) raw.normals.clear();
+  if (!attributes) raw.places.clear();
   MeshWithNormals mesh = without_repeats(raw);
   if (mesh.mesh.triangles.empty()) throw std::runtime_error("it holds no triangles");
   return mesh;
+}
+
+/// Smooth normals of a mesh with the places of its file, whose triangles are the same.
+MeshWithNormals with_smooth_normals(const MeshWithNormals& file, double angle) {
+  MeshWithNormals smooth = with_smooth_normals(joined_vertices(file, false).mesh, angle);
+  if (file.places.empty()) return smooth;
+  const MeshWithNormals placed = joined_vertices(file, true);
+  MeshWithNormals corners;
+  for (std::size_t t = 0; t < smooth.mesh.triangles.size(); ++t) {
+    Triangle triangle{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      triangle[k] = static_cast<std::uint32_t>(corners.mesh.vertices.size());
+      corners.mesh.vertices.push_back(smooth.mesh.vertices[smooth.mesh.triangles[t][k]]);
+      corners.normals.push_back(smooth.normals[smooth.mesh.triangles[t][k]]);
+      corners.places.push_back(placed.places[placed.mesh.triangles[t][k]]);
+    }
+    corners.mesh.triangles.push_back(triangle);
+  }
+  return joined_vertices(corners, true);
 }
 
 void turn_round(TriangleMesh& mesh) {
@@ -139,14 +175,15 @@ Eigen::Vector3f mean_normal(const TriangleCorner& corner, const std::vector<Tria
 
 }  // namespace
 
-TriangleMesh read_mesh(const std::filesystem::path& path) {
-  return naming(path, [&] { return read_joined(path, false).mesh; });
+TriangleMesh read_mesh(const std::filesystem::path& path, const Eigen::Matrix3d& turn) {
+  return naming(path, [&] { return joined_vertices(read_finite(path, turn), false).mesh; });
 }
 
-MeshWithNormals read_mesh_with_normals(const std::filesystem::path& path, std::optional<double> smooth_angle) {
+MeshWithNormals read_mesh_with_normals(const std::filesystem::path& path, std::optional<double> smooth_angle,
+                                       const Eigen::Matrix3d& turn) {
   return naming(path, [&] {
-    if (smooth_angle) return with_smooth_normals(read_joined(path, false).mesh, *smooth_angle);
-    return read_joined(path, true);
+    const MeshWithNormals raw = read_finite(path, turn);
+    return smooth_angle ? with_smooth_normals(raw, *smooth_angle) : joined_vertices(raw, true);
   });
 }
 

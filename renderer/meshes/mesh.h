@@ -12,24 +12,29 @@
 
 namespace tensorray {
 
-/// Triangles and the normals that shading takes at their corners. A vertex is there once for each of its normals.
+/// Triangles, and what pictures take at their corners. A vertex is there once for each of its normals and places.
 struct MeshWithNormals {
   TriangleMesh mesh;
   /// For each vertex, any length; zero: none is known. Empty: no vertex has one.
   std::vector<Eigen::Vector3f> normals;
+  /// The place of each vertex in pictures on the mesh: (0, 0) is the lower left corner, (1, 1) the upper right one.
+  /// Empty: the file has none.
+  std::vector<Eigen::Vector2f> places;
 };
 
 /// Reads all meshes of a file as one mesh. Polygons are triangulated, vertices at equal positions are joined, unused
 /// vertices and triangles of zero area are dropped. Positions have the file's precision in .ply, and single precision
 /// in other formats. Formats with unit and axes (.gltf, .glb, .dae, .fbx) are in metres with +z up.
+/// @param turn  A rotation of the formats that have no axes.
 /// @throw std::runtime_error naming the file and the reason: missing, unreadable, no triangles, a vertex that is not
 /// finite in single precision.
-TriangleMesh read_mesh(const std::filesystem::path& path);
+TriangleMesh read_mesh(const std::filesystem::path& path, const Eigen::Matrix3d& turn = Eigen::Matrix3d::Identity());
 
-/// The same mesh for pictures: a vertex is there once for each of its normals.
+/// The same mesh for pictures. Places are those of .obj, .gltf, .glb, .dae and .fbx.
 /// @param smooth_angle  Radians: normals are made so that edges look smooth where triangles are turned against each
 /// other by at most this. None: the normals of the file, flat triangles where it has none.
-MeshWithNormals read_mesh_with_normals(const std::filesystem::path& path, std::optional<double> smooth_angle);
+MeshWithNormals read_mesh_with_normals(const std::filesystem::path& path, std::optional<double> smooth_angle,
+                                       const Eigen::Matrix3d& turn = Eigen::Matrix3d::Identity());
 
 /// At each corner of a triangle, the mean normal of the triangles that share the vertex and are turned against this one
 /// by at most `angle` radians, weighted by their angles at the vertex (Thürmer and Wüthrich 1998), so that it does not

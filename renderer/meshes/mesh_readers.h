@@ -19,8 +19,8 @@ namespace tensorray {
 /// file, never returns from a truncated header, and misreads binary vertices that begin with the byte of a line end.
 MeshWithNormals read_ply(const std::filesystem::path& path);
 
-/// Wavefront's format (.obj): v, vn and f; all objects and groups are one mesh. Points, lines, texture coordinates and
-/// materials have no surface and are left out. Anything else is an error with its line, so that no face is lost.
+/// Wavefront's format (.obj): v, vt, vn and f; all objects and groups are one mesh. Points, lines and materials have no
+/// surface and are left out. Anything else is an error with its line, so that no face is lost.
 /// This reader exists because libraries make another mesh of what they do not understand, without a word: assimp 5.2
 /// leaves out faces v/vt/vn of files without vt, and faces before a comment; tinyobjloader takes words that are no
 /// numbers for 0, and leaves out continued lines and unknown statements.

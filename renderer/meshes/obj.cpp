@@ -18,9 +18,9 @@ using Words = std::vector<std::string>;
 
 constexpr std::uint32_t none = 0xffffffff;
 
-/// A corner of a face: its vertex and its normal, from 0.
+/// A corner of a face: its vertex, place and normal, from 0.
 struct ObjCorner {
-  std::uint32_t vertex = none, normal = none;
+  std::uint32_t vertex = none, place = none, normal = none;
 };
 
 struct ObjFace {
@@ -30,14 +30,15 @@ struct ObjFace {
 struct ObjContents {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Eigen::Vector3f> normals;
+  std::vector<Eigen::Vector2f> places;
   std::vector<ObjCorner> corners;  ///< Of all faces.
   std::vector<ObjFace> faces;
 };
 
 bool is_without_surface(const std::string& keyword) {
-  static const std::set<std::string> keywords{"p",     "l",   "vt",       "vp",       "o",         "g",
-                                              "s",     "mg",  "usemtl",   "mtllib",   "usemap",    "maplib",
-                                              "bevel", "lod", "c_interp", "d_interp", "trace_obj", "shadow_obj"};
+  static const std::set<std::string> keywords{"p",   "l",        "vp",       "o",         "g",         "s",
+                                              "mg",  "usemtl",   "mtllib",   "usemap",    "maplib",    "bevel",
+                                              "lod", "c_interp", "d_interp", "trace_obj", "shadow_obj"};
   return keywords.count(keyword) > 0;
 }
 
@@ -72,12 +73,21 @@ std::uint32_t index_of(const std::string& word, std::size_t count, const char* w
   return static_cast<std::uint32_t>(from_zero);
 }
 
+/// u, u v or u v w.
+Eigen::Vector2f place_of(const Words& words) {
+  if (words.size() < 2) throw std::runtime_error("\"vt\" needs a number");
+  return {static_cast<float>(component_of(words[1])),
+          words.size() > 2 ? static_cast<float>(component_of(words[2])) : 0.0f};
+}
+
 /// v, v/vt, v//vn or v/vt/vn. Texture coordinates need not exist.
 ObjCorner obj_corner_of(const std::string& word, const ObjContents& contents) {
   const std::size_t first = word.find('/');
   const std::size_t second = first == std::string::npos ? first : word.find('/', first + 1);
   ObjCorner corner;
   corner.vertex = index_of(word.substr(0, first), contents.vertices.size(), "vertex");
+  if (first != std::string::npos && first + 1 < std::min(second, word.size()))
+    corner.place = index_of(word.substr(first + 1, second - first - 1), contents.places.size(), "texture coordinate");
   if (second != std::string::npos && second + 1 < word.size())
     corner.normal = index_of(word.substr(second + 1), contents.normals.size(), "normal");
   return corner;
@@ -95,6 +105,8 @@ void read_obj_statement(const Words& words, std::size_t line, ObjContents& conte
     contents.vertices.push_back(vertex_of(words));
   else if (keyword == "vn")
     contents.normals.push_back(vector_of(words).cast<float>());
+  else if (keyword == "vt")
+    contents.places.push_back(place_of(words));
   else if (keyword == "f" || keyword == "fo")
     read_obj_face(words, line, contents);
   else if (!is_without_surface(keyword))
@@ -155,6 +167,9 @@ void add_obj_face(const ObjContents& contents, std::size_t first, std::size_t en
     const bool has_normal = corner.normal != none;
     if (!contents.normals.empty())
       result.normals.push_back(has_normal ? contents.normals[corner.normal] : Eigen::Vector3f(0, 0, 0));
+    const bool has_place = corner.place < contents.places.size();
+    if (!contents.places.empty())
+      result.places.push_back(has_place ? contents.places[corner.place] : Eigen::Vector2f(0, 0));
   }
   add_polygon(vertices, result.mesh);
 }

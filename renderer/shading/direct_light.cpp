@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "renderer/shading/wavefront.h"
 
@@ -45,6 +47,33 @@ Eigen::Map<const Eigen::ArrayXf> as_array(const std::vector<float>& values) {
   return {values.data(), static_cast<Eigen::Index>(values.size())};
 }
 
+/// At the edge of a map of light, which its pixels make smooth, straight light ends as smoothly: takes the light of
+/// the map from the sample, and leaves in `of_one_light` the part of it that comes straight.
+/// @param enters  Whether the sample's ray enters the region. @return the light's index; −1: the point is at no edge.
+int split_at_edge(Wavefront& front, const PathState& path, bool enters) {
+  constexpr double rounding = 1e-5;
+  const SurfaceHit& hit = path.vertex.hit;
+  LightSample& light = front.memory.light_sample;
+  std::vector<float>& part = front.memory.of_one_light;
+  for (const IrradianceMap& map : front.scene.irradiance_maps) {
+    const bool may_be_it = light.light == map.light || (light.light < 0 && !light.is_delta);
+    if (!may_be_it || map.surface != hit.surface || !is_lit(map, hit.position, path.vertex.direction)) continue;
+    const std::optional<double> through = straight_at(map, hit.position);
+    if (!through || std::abs(*through - (enters ? 1 : 0)) < rounding) continue;
+    if (light.light == map.light)
+      part = light.radiance;
+    else
+      front.scene.lights.background(light.direction, part, true, map.light, path.bands());
+    if (!(as_array(part).maxCoeff() > 0)) continue;
+    for (std::size_t band = 0; band < part.size(); ++band) {
+      light.radiance[band] = std::max(0.0f, light.radiance[band] - part[band]);
+      part[band] *= static_cast<float>(1 - *through);
+    }
+    return map.light;
+  }
+  return -1;
+}
+
 /// The background's light is divided as the radiances of its lights.
 void add_to_groups(Wavefront& front, const PathState& path, const BandValues& light, const LightSource& source) {
   const ShadedScene& scene = front.scene;
@@ -82,15 +111,23 @@ void sample_direct_light(Wavefront& front, PathState& path, const Eigen::Vector2
   const double material_pdf = evaluate(*vertex.material, vertex.view, vertex.reflectance, wi, contribution);
   if (!(contribution.maxCoeff() > 0)) return;
   const StraightRay ray{vertex.start(scene.surfaces, wi), light.direction};
-  if (enters_region(scene, ray, light.distance)) return seek_bent_light(front, path, ray, wi, contribution);
-  if (is_shadowed(scene.surfaces, light, ray.origin, vertex.point)) return;
-  double factor = std::abs(wi.z()) / light.pdf;
-  if (front.settings.direct == DirectLight::both && !light.is_delta) {
-    const double ratio = material_pdf / light.pdf;
-    factor /= 1 + ratio * ratio;
+  const bool enters = enters_region(scene, ray, light.distance);
+  const int split = split_at_edge(front, path, enters);
+  if ((!enters || split >= 0) && !is_shadowed(scene.surfaces, light, ray.origin, vertex.point)) {
+    double factor = std::abs(wi.z()) / light.pdf;
+    if (front.settings.direct == DirectLight::both && !light.is_delta) {
+      const double ratio = material_pdf / light.pdf;
+      factor /= 1 + ratio * ratio;
+    }
+    const auto add = [&](const std::vector<float>& radiance, BandValues& scattered, const LightSource& source) {
+      scattered *= path.throughput * as_array(radiance).cast<double>() * factor;
+      add_light(front, path, scattered, source);
+    };
+    BandValues of_map;
+    if (split >= 0) add(front.memory.of_one_light, of_map = contribution, {split});
+    if (!enters) return add(light.radiance, contribution, {light.light, light.direction, split < 0, &light.radiance});
   }
-  contribution *= path.throughput * as_array(light.radiance).cast<double>() * factor;
-  add_light(front, path, contribution, {light.light, light.direction, true, &light.radiance});
+  if (enters) seek_bent_light(front, path, ray, wi, contribution);
 }
 
 void add_light(Wavefront& front, const PathState& path, BandValues& light, const LightSource& source) {

@@ -24,7 +24,7 @@ Vector3d facing_normal(const SurfaceHit& hit, const Vector3d& direction, double 
 }
 
 const Material& material_of(const ShadedScene& scene, const SurfaceHit& hit) {
-  return scene.materials[scene.surfaces.surfaces()[hit.surface].material];
+  return scene.materials[scene.surfaces.surfaces()[hit.surface].material + hit.roughness_step];
 }
 
 /// Begins to shade `rays`, and finds the surfaces that they meet if they are not bent.
@@ -71,7 +71,8 @@ void shade_view(Wavefront& front, std::size_t number, PathState& path) {
 void set_reflectance(const ShadedScene& scene, const SurfaceHit& hit, Eigen::Index first_band,
                      BandValues& reflectance) {
   const ShadedSurface& surface = scene.surfaces.surfaces()[hit.surface];
-  if (surface.colors.empty() && !surface.texture)
+  const bool has_picture = surface.texture || (surface.pictures && !surface.pictures->color.pixels.empty());
+  if (surface.colors.empty() && !has_picture)
     reflectance = scene.materials[surface.material].reflectance.segment(first_band, reflectance.size());
   else
     scene.colors.reflectance(hit.color, reflectance, first_band);
@@ -94,7 +95,7 @@ void meet_surface(const ShadedScene& scene, const SurfaceHit& hit, const Vector3
 
 Eigen::Vector3f albedo(const ShadedScene& scene, const SurfaceHit& hit, BandValues& reflectance) {
   if (const BandValues* const fresnel = mean_fresnel(material_of(scene, hit))) reflectance *= *fresnel;
-  return scene.colors.color(reflectance);
+  return scene.colors.color(reflectance).cast<float>();
 }
 
 void require_shadable(const ShadedScene& scene, const ShadingSettings& settings) {

@@ -21,6 +21,18 @@ struct SurfaceTexture {
   bool smooth = true;                   ///< Linear interpolation between the middles of pixels; false: sharp pixels.
 };
 
+/// Pictures on a mesh, each with rows from the top, or empty. They repeat beyond their edges.
+struct MeshPictures {
+  struct Picture {
+    int width = 0, height = 0;
+    std::vector<Eigen::Vector3f> pixels;
+  };
+  Picture color;      ///< Working space, 0 to 1.
+  Picture roughness;  ///< The second value chooses one of `roughness_steps` materials: 0 the first, 1 the last.
+  Picture normal;     ///< 2 x − 1 is a normal along the tangents of u and v, and the shading normal (OpenGL's).
+  int roughness_steps = 1;
+};
+
 /// Strands of round cones: the centre and the radius change linearly from point to point, and the ends are round.
 /// Shading treats their axes as smooth. For opaque materials.
 struct RoundCurves {
@@ -36,12 +48,14 @@ struct RoundCurves {
 struct ShadedSurface {
   std::variant<TriangleMesh, RoundCurves> shape;
   std::vector<Eigen::Vector3f> normals;  ///< For each point, meshes only; any length. Empty: flat triangles.
-  int material = 0;                      ///< Index of the material.
+  int material = 0;                      ///< Index of the material, or of the first one of a picture of roughness.
   float opacity = 1;                     ///< Meshes only: the part of the rays that meet it; others pass.
   int light = -1;                        ///< Index of the AreaLight with this mesh, if the surface emits light.
 
   std::vector<Eigen::Vector3f> colors;  ///< For each point; working space, 0 to 1. Empty: the material's reflectance.
   std::shared_ptr<const SurfaceTexture> texture;  ///< Colours of a flat surface, instead of `colors`; or null.
+  std::vector<Eigen::Vector2f> places;            ///< For each point, meshes only: u and v of `pictures`.
+  std::shared_ptr<const MeshPictures> pictures;   ///< Of a mesh with places; or null.
   std::vector<float> forces;                      ///< For each point.
   std::vector<float> arc_lengths;                 ///< For each point.
   std::vector<std::uint32_t> path_ends;  ///< Triangles up to the end of each path, as in TubeMesh. Empty: no paths.

@@ -74,6 +74,8 @@ void require_valid(const ShadedSurface& surface) {
   };
   require(fits(surface.normals), "there must be no normals, or a finite one for each point");
   require(fits(surface.colors), "there must be no colors, or a finite one for each point");
+  require(fits(surface.places) && (!surface.pictures || !surface.places.empty()),
+          "a mesh with pictures must have a finite place for each point");
   require(fits(surface.forces), "there must be no forces, or a finite one for each point");
   require(fits(surface.arc_lengths), "there must be no arc_lengths, or a finite one for each point");
   require(surface.material >= 0, "the material's index must be >= 0");
@@ -156,6 +158,37 @@ Vector3d tangent(const RoundCurves& curves, std::uint32_t point, const Vector3d&
   const Vector3d mean = (curves.points[point] - curves.points[point - 1]).stableNormalized() +
                         (curves.points[point + 1] - curves.points[point]).stableNormalized();
   return mean.squaredNorm() > 0.01 ? Vector3d(mean.normalized()) : axis;
+}
+
+Vector3f value_at(const MeshPictures::Picture& picture, const Eigen::Vector2f& place) {
+  const auto wrapped = [](double x, int size) { return static_cast<int>(x - size * std::floor(x / size)) % size; };
+  const Eigen::Array2d at(place.x() * double(picture.width) - 0.5, (1 - double(place.y())) * picture.height - 0.5);
+  const Eigen::Array2d corner = at.floor();
+  const Eigen::Array2f part = (at - corner).cast<float>();
+  const auto row = [&](double y) -> Vector3f {
+    const auto pixel = [&](double x) -> const Vector3f& {
+      return picture
+          .pixels[static_cast<std::size_t>(wrapped(y, picture.height)) * picture.width + wrapped(x, picture.width)];
+    };
+    return (1 - part.x()) * pixel(corner.x()) + part.x() * pixel(corner.x() + 1);
+  };
+  return (1 - part.y()) * row(corner.y()) + part.y() * row(corner.y() + 1);
+}
+
+/// The shading normal, tilted by a picture of normals. Where it would be below the triangle, it is on it.
+Vector3d tilted(const TriangleMesh& mesh, const std::vector<Eigen::Vector2f>& places, const Corners& corners,
+                const SurfaceHit& hit, const Vector3f& pixel) {
+  const auto& [a, b, c] = corners.point;
+  const Vector3d x = mesh.vertices[b] - mesh.vertices[a], y = mesh.vertices[c] - mesh.vertices[a];
+  const Eigen::Vector2d s = (places[b] - places[a]).cast<double>(), t = (places[c] - places[a]).cast<double>();
+  const double area = s.x() * t.y() - s.y() * t.x();
+  if (area == 0) return hit.shading_normal;
+  const Vector3d& N = hit.shading_normal;
+  const Vector3d along_u = (t.y() * x - s.y() * y) / area, across = along_u - N.dot(along_u) * N;
+  const Vector3d u = across.normalized(), v = N.cross(u) * (area * N.dot(x.cross(y)) < 0 ? -1 : 1);
+  const Vector3d tilt = 2 * pixel.cast<double>() - Vector3d::Ones();
+  const Vector3d result = tilt.x() * u + tilt.y() * v + tilt.z() * N;
+  return result.dot(hit.normal) > 0 ? Vector3d(result.normalized()) : hit.shading_normal;
 }
 
 Vector3f color_at(const SurfaceTexture& texture, const Vector3d& point) {
@@ -291,7 +324,21 @@ struct SurfaceScene::State {
     }
     hit.distance = (hit.position - ray.origin).dot(ray.direction);
     if (surface.texture) hit.color = color_at(*surface.texture, hit.position);
+    if (surface.pictures && mesh) look_up(surface, *mesh, hit);
     return found;
+  }
+
+  void look_up(const ShadedSurface& surface, const TriangleMesh& mesh, SurfaceHit& hit) const {
+    const MeshPictures& pictures = *surface.pictures;
+    const Corners corner = corners(hit);
+    const Eigen::Vector2f place = corner.mean(surface.places);
+    if (!pictures.color.pixels.empty()) hit.color = value_at(pictures.color, place);
+    if (!pictures.roughness.pixels.empty()) {
+      const double roughness = std::clamp(double{value_at(pictures.roughness, place).y()}, 0.0, 1.0);
+      hit.roughness_step = static_cast<std::uint32_t>(std::lround(roughness * (pictures.roughness_steps - 1)));
+    }
+    if (!pictures.normal.pixels.empty())
+      hit.shading_normal = tilted(mesh, surface.places, corner, hit, value_at(pictures.normal, place));
   }
 
   Corners corners(const SurfaceHit& hit) const {

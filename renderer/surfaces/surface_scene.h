@@ -25,6 +25,7 @@ struct SurfaceHit {
   Eigen::Vector3d shading_normal = Eigen::Vector3d::Zero();  ///< Unit, interpolated; on the same side as `normal`.
   Eigen::Vector3f color = Eigen::Vector3f::Zero();           ///< Zero if the surface has no colours.
   std::uint32_t surface = 0;                                 ///< Index of the surface.
+  std::uint32_t roughness_step = 0;                          ///< Added to the index of its material.
   std::uint32_t primitive = 0;                               ///< Index of the triangle, or of the segment of curves.
   float u = 0, v = 0;  ///< Barycentric weights of vertices 1 and 2. On a segment: position along it, and 0.
 };

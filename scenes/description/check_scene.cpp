@@ -13,6 +13,7 @@
 #include "base/text/path_text.h"
 #include "base/text/text.h"
 #include "renderer/color/color.h"
+#include "renderer/images/image.h"
 
 namespace tensorray {
 namespace {
@@ -72,13 +73,30 @@ void check_objects(const SceneDescription& scene, const SceneSource& source) {
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const ObjectDescription& object = scene.objects[i];
     const auto* pattern = std::get_if<Pattern>(&object.texture);
-    if (!object.plate && !(pattern && *pattern == Pattern::none))
-      source.fail(fmt::format("`/objects/{}/texture`: only plates have textures; remove it", i));
+    const bool is_mesh = !object.file.empty(), is_plain = pattern && *pattern == Pattern::none;
+    if (!object.plate && !is_plain && (pattern || !is_mesh))
+      source.fail(fmt::format("`/objects/{}/texture`: patterns are for plates, pictures for plates and meshes", i));
+    if (!is_mesh && !(object.roughness_texture.empty() && object.normal_texture.empty()))
+      source.fail(fmt::format("`/objects/{}`: only a mesh (`file`) has `roughness_texture` or `normal_texture`", i));
+    if (!object.roughness_texture.empty() && object.material.kind == MaterialKind::diffuse)
+      source.fail(fmt::format("`/objects/{}/roughness_texture`: `material.kind` \"diffuse\" has no roughness", i));
     if (!object.texture_layer.empty() && pattern)
       source.fail(fmt::format("`/objects/{}/texture_layer`: only pictures have layers; remove it", i));
     if (object.smooth_angle && object.file.empty())
       source.fail(fmt::format("`/objects/{}/smooth_angle`: only meshes (`file`) have smooth edges; remove it", i));
   }
+}
+
+void check_layers(const SceneDescription& scene, const SceneSource& source) {
+  if (!scene.output.exr_layers) return;
+  std::vector<std::string> known;
+  for (const std::string& channel : scene.integrator.method().channels(scene))
+    if (const std::string layer = layer_of(channel); !layer.empty() && (known.empty() || known.back() != layer))
+      known.push_back(layer);
+  for (const std::string& layer : *scene.output.exr_layers)
+    if (std::find(known.begin(), known.end(), layer) == known.end())
+      source.fail(fmt::format("`/output/exr_layers`: {} makes no layer \"{}\"; it makes {}",
+                              scene.integrator.method().name(), layer, joined(known)));
 }
 
 /// Removes outputs that only another method can make, with a warning. @throw SceneError if no output is left.
@@ -156,6 +174,7 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   check_lights(scene, source);
   check_objects(scene, source);
   drop_unmade_outputs(scene, source);
+  check_layers(scene, source);
   for (const auto& method : scene.integrator.methods)
     method->check(scene, json, source, method.get() == &scene.integrator.method());
   check_files(scene);
@@ -193,6 +212,8 @@ std::vector<NamedFile> input_files(const SceneDescription& scene) {
     files.push_back({scene.objects[i].file, fmt::format("`/objects/{}/file`", i)});
     if (const auto* picture = std::get_if<std::filesystem::path>(&scene.objects[i].texture))
       files.push_back({*picture, fmt::format("`/objects/{}/texture`", i)});
+    files.push_back({scene.objects[i].roughness_texture, fmt::format("`/objects/{}/roughness_texture`", i)});
+    files.push_back({scene.objects[i].normal_texture, fmt::format("`/objects/{}/normal_texture`", i)});
   }
   for (const auto& method : scene.integrator.methods)
     for (NamedFile& file : method->inputs()) files.push_back(std::move(file));

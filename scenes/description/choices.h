@@ -31,6 +31,8 @@ inline Words words(Projection) { return {"perspective", "orthographic"}; }
 inline Words words(LightKind) { return {"constant", "environment", "directional", "area", "point"}; }
 inline Words words(LightCaustic) { return {"auto", "map", "photons"}; }
 inline Words words(Annotation) { return {"scale", "axes", "legend", "body", "hidden"}; }
+inline Words words(UpAxis) { return {"z", "y"}; }
+inline Words words(ExrType) { return {"float", "half"}; }
 inline Words words(Pattern) { return {"none", "checkerboard"}; }
 
 inline Words words(Invariant) {

@@ -89,6 +89,7 @@ struct FieldDescription {
   Derive derive = Derive::none;
   ComponentGrids components;  ///< The grids that are the field's components; empty: found by their names.
   double smooth = 0;          ///< Deviation of the Gaussian that smooths the field, voxels; 0: none.
+  bool noise = false;         ///< Whether the field is replaced by its noise alone (keep_noise).
   Eigenvalues eigenvalues = Eigenvalues::automatic;
   Interpolation interpolation = Interpolation::cubic;
   BorderChoice border = BorderChoice::automatic;
@@ -189,8 +190,9 @@ struct ObjectDescription {
   /// Of a mesh: edges look smooth where triangles are turned by at most this, degrees; none: as its normals say.
   std::optional<double> smooth_angle;
   std::optional<PathsDescription> paths;
-  std::variant<Pattern, std::filesystem::path> texture = Pattern::none;  ///< Of a plate; a pattern or a picture.
+  std::variant<Pattern, std::filesystem::path> texture = Pattern::none;  ///< A pattern (of a plate), or a picture.
   std::string texture_layer;                                             ///< Layer of the picture; empty: any.
+  std::filesystem::path roughness_texture, normal_texture;               ///< Pictures on a mesh; empty: none.
   int squares = 16;                                                      ///< checkerboard: along the shorter side.
   MaterialDescription material;
 };
@@ -214,17 +216,23 @@ struct IntegratorDescription {
 /// What is drawn over `image`.
 enum class Annotation { scale, axes, legend, body, hidden };
 
+/// How an EXR stores colours and normals.
+enum class ExrType { single, half };
+
 struct OutputDescription {
   std::vector<Output> kinds;                           ///< All kinds of output that any method can write.
   std::map<std::string, std::filesystem::path> files;  ///< Files to write, by Output::key.
   bool fluence_bands = false;                          ///< Whether `fluence` also has a grid for each band.
   bool stokes = false;                                 ///< Whether `spectral` has Stokes' parameters.
+  ExrType exr_type = ExrType::single;
+  std::optional<std::vector<std::string>> exr_layers;  ///< Of `exr`, beside R, G, B and A; none: all.
   std::optional<double> exposure;                      ///< Exposure of `image` in stops; none: "auto".
   bool white_balance = true;  ///< Whether the white of the light is adapted to that of the working space.
   std::string ocio;           ///< OCIO config, as of ColorSettings; empty: $OCIO, or the built-in one.
   std::string display, view;  ///< Empty: the default of the config.
   std::vector<Annotation> annotations;
-  std::string caption;  ///< A line that is drawn over `image`; with the values of keys.
+  bool default_annotations = false;  ///< The method has chosen them: where one has no meaning, it is left out.
+  std::string caption;               ///< A line that is drawn over `image`; with the values of keys.
 
   bool wants(const std::string& key) const { return files.count(key) > 0; }
   bool wants(Annotation annotation) const {
@@ -232,10 +240,18 @@ struct OutputDescription {
   }
 };
 
+/// The axis that points up in a scene, and in the files that it names.
+enum class UpAxis { z, y };
+
+struct WorldDescription {
+  UpAxis up = UpAxis::z;
+};
+
 struct SceneDescription {
   std::filesystem::path path;  ///< The scene file.
   std::string text;            ///< The scene as JSON, with overrides applied; written into the headers of the outputs.
   std::uint64_t seed = 0;
+  WorldDescription world;
   FieldDescription field;
   BendingDescription bending;
   LightDescription light;
@@ -249,6 +265,15 @@ struct SceneDescription {
   bool default_objects = true;  ///< No `objects` are given: there is a floor.
   OutputDescription output;
   std::vector<std::string> warnings;  ///< Likely mistakes that are allowed; one line each.
+  bool judges_scale = true;           ///< Whether notes say how much a given scale shows, which takes probe rays.
+
+  /// From the axes of the scene and its files to those of the program, in which z is up. Positions and directions in
+  /// this struct are turned already.
+  Eigen::Matrix3d turn() const {
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+    if (world.up == UpAxis::y) turn << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+    return turn;
+  }
 };
 
 }  // namespace tensorray

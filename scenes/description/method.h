@@ -6,8 +6,11 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "base/files/output_file.h"
 #include "scenes/keys/key_visitor.h"
@@ -70,6 +73,9 @@ class Method {
   /// The kinds of output that the method can write.
   virtual std::vector<Output> outputs() const = 0;
 
+  /// The channels that its EXR of the scene may have.
+  virtual std::vector<std::string> channels(const SceneDescription& scene) const = 0;
+
   /// Whether its pictures have noise, which `integrator.max_samples` samples a pixel average.
   virtual bool is_sampled() const { return false; }
 
@@ -78,6 +84,13 @@ class Method {
 
   /// Whether `light.direction` has an effect on the picture.
   virtual bool needs_light_direction(const SceneDescription&) const { return true; }
+
+  /// The direction in which its picture looks through the field, if that is not along the light; the automatic scale
+  /// shows both then. @param middle  Of the field.
+  virtual std::optional<Eigen::Vector3d> view_through(const SceneDescription&,
+                                                      const Eigen::Vector3d& /*middle*/) const {
+    return std::nullopt;
+  }
 
   /// Whether the field bends its light: it has a scale then, and a direction in which it shows most.
   virtual bool bends_light() const { return true; }

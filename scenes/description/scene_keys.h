@@ -38,6 +38,7 @@ inline void describe(FieldDescription& field, KeyVisitor& visit) {
   visit.exclude("components", {"generate"});
   visit("smooth", field.smooth, "standard deviation of a Gaussian that smooths the field first, voxels; 0 is none",
         between(0, max_smoothing));
+  visit("noise", field.noise, "replace the field by its noise alone, without structure, for a picture beside its own");
   visit("eigenvalues", field.eigenvalues,
         "raw: as they are; absolute: |T|; positive: (T^2)^(1/2); auto: absolute if the field is symmetric (not "
         "of -viscous_stress), else raw",
@@ -179,8 +180,12 @@ inline void describe(ObjectDescription& object, KeyVisitor& visit) {
         between(0, 180).or_word("auto"));
   visit.section("paths", object.paths,
                 "bent rays as tubes, with the seeds, style, radius and colours of `integrator` (path_tracing)");
-  visit("texture", object.texture, "of a plate: a pattern, or a picture whose colours are its reflectance");
+  visit("texture", object.texture,
+        "a picture whose colours are the reflectance of a plate, or of a mesh with texture coordinates; of a plate "
+        "also a pattern");
   visit("texture_layer", object.texture_layer, "of a picture: layer of the file (.exr)");
+  visit("roughness_texture", object.roughness_texture, "of a mesh: a picture of its roughness, 0 to 1, not converted");
+  visit("normal_texture", object.normal_texture, "of a mesh: a picture of its normals along u, v and the surface");
   visit("squares", object.squares, "checkerboard: squares along the shorter side", between(1, 4096));
   visit.section("material", object.material, "material; the brighter squares of a checkerboard have its colour");
 }
@@ -200,6 +205,8 @@ inline void describe(OutputDescription& output, KeyVisitor& visit) {
   visit("fluence_bands", output.fluence_bands, "write a further grid to `fluence` for each band of wavelengths");
   visit("stokes", output.stokes,
         "polariscope: `spectral` has the four Stokes parameters of the light on the last polariser");
+  visit("exr_type", output.exr_type, "how `exr` stores colours and normals; other layers are always float");
+  visit("exr_layers", output.exr_layers, "layers of `exr` beside R, G, B and A, such as Z, normal; default: all");
   visit("exposure", output.exposure, "exposure of `image`, stops", between(-100, 100).or_word("auto").as_knob(-8, 8));
   visit("white_balance", output.white_balance, "adapt the light's white to the working space's");
   visit("ocio", output.ocio,
@@ -209,6 +216,10 @@ inline void describe(OutputDescription& output, KeyVisitor& visit) {
   visit("annotations", output.annotations,
         "what is drawn over `image`: a scale bar, the world's axes, a legend, the lines of bodies");
   visit("caption", output.caption, "a line over `image`; {field.scale} is the value of a key, # counts frames");
+}
+
+inline void describe(WorldDescription& world, KeyVisitor& visit) {
+  visit("up", world.up, "the axis that points up, here and in the files that are read and written: z or y");
 }
 
 /// An item of `obstacles`.
@@ -226,6 +237,7 @@ inline void describe(SceneDescription& scene, KeyVisitor& visit) {
   std::string schema;  // Only editors use it.
   visit("$schema", schema, "path of this schema, for editors");
   visit("seed", scene.seed, "seed of the random numbers", between(0, largest_exact_integer));
+  visit.section("world", scene.world, "the axes of the scene");
   visit.section("field", scene.field, "the tensor field");
   visit.section("bending", scene.bending, "how the field bends light");
   visit.section("light", scene.light, "parallel light through the volume");

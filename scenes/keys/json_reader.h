@@ -22,6 +22,7 @@ std::string printable(const std::string& text);
 /// The file from which a scene was read. Errors name it, and relative paths are relative to its folder.
 struct SceneSource {
   std::filesystem::path path;  ///< The scene file.
+  bool is_y_up = false;        ///< Its positions and directions are turned when they are read, so that z is up.
 
   /// The file that a path in the scene file means: a relative path is relative to the scene file's folder.
   std::filesystem::path resolve(const std::filesystem::path& written) const;

@@ -8,6 +8,8 @@
 
 #include <fmt/core.h>
 
+#include "base/text/habits.h"
+
 namespace tensorray {
 namespace {
 
@@ -37,6 +39,7 @@ std::string quoted_list(const std::vector<std::string>& names, const char* separ
 
 /// "did you mean `light`?"; if no known key is similar to `key`, the list of known keys.
 std::string suggestion(const std::string& key, const std::set<std::string>& known) {
+  if (const std::string here = name_here(key); !here.empty()) return "here it is " + here;
   constexpr std::size_t longest = 64;  // All keys are shorter. edit_distance takes quadratic time.
   std::string nearest;
   std::size_t least = key.size() > longest ? 0 : std::max<std::size_t>(2, key.size() / 2);
@@ -49,6 +52,16 @@ std::string suggestion(const std::string& key, const std::set<std::string>& know
   }
   if (!nearest.empty()) return fmt::format("did you mean `{}`?", nearest);
   return "known keys are " + quoted_list({known.begin(), known.end()}, ", ");
+}
+
+/// A position or direction of a scene in which y is up, in axes in which z is; other values as they are.
+Json turned(const std::string& key, const Json& value) {
+  static const std::set<std::string> in_world{"direction", "up",     "center", "normal",
+                                              "position",  "target", "from",   "to"};
+  const auto is_number = [](const Json& item) { return item.is_number(); };
+  if (!in_world.count(key) || !value.is_array() || value.size() != 3) return value;
+  if (!std::all_of(value.begin(), value.end(), is_number)) return value;
+  return {value[0], 0.0 - value[2].get<double>(), value[1]};
 }
 
 /// Voxels along each axis of `extent`: `longest` along the longest axis, and voxels as close to cubes as possible.
@@ -105,7 +118,7 @@ void SectionReader::value(const char* key, KeyMember& member, const char* /*mean
   if (!value) return;
   if (limits.word && *value == limits.word)
     member.set_word();
-  else if (!member.read(*value, limits))
+  else if (!member.read(source_.is_y_up ? turned(key, *value) : *value, limits))
     refuse(key, member.expectation(limits), limits.word);
   member.resolve(source_);
 }
@@ -143,7 +156,8 @@ void SectionReader::generator(const char* key, std::optional<GenerateDescription
   const Json* value = find(key);
   if (!value) return;
   if (!value->is_object()) refuse(key, "an object");
-  SectionReader inner(*value, pointer_to(key), source_);
+  const SceneSource upright{source_.path};  // Generators have z up.
+  SectionReader inner(*value, pointer_to(key), upright);
   const std::string kinds = "one of " + quoted_list(generator_kinds(), ", ");
   const Json* kind = inner.find("kind");
   if (!kind) source_.fail(fmt::format("`{}` needs the key `kind`: {}", pointer_to(key), kinds));

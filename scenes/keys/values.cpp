@@ -188,6 +188,23 @@ Json Value<std::vector<double>>::schema(const std::vector<double>&, const Limits
 
 Json Value<std::vector<double>>::json(const std::vector<double>& value) { return value; }
 
+bool Value<std::vector<std::string>>::read(const Json& json, const Limits&, std::vector<std::string>& target) {
+  if (!json.is_array() || !std::all_of(json.begin(), json.end(), [](const Json& item) { return item.is_string(); }))
+    return false;
+  target = json.get<std::vector<std::string>>();
+  return true;
+}
+
+std::string Value<std::vector<std::string>>::expectation(const std::vector<std::string>&, const Limits&) {
+  return "a list of strings";
+}
+
+Json Value<std::vector<std::string>>::schema(const std::vector<std::string>&, const Limits&) {
+  return {{"type", "array"}, {"items", {{"type", "string"}}}};
+}
+
+Json Value<std::vector<std::string>>::json(const std::vector<std::string>& value) { return value; }
+
 bool Value<IntegerOrThree>::read(const Json& json, const Limits& limits, IntegerOrThree& target) {
   if (json.is_array()) return Value<Eigen::Vector3i>::read(json, limits, target.emplace<Eigen::Vector3i>());
   return Value<int>::read(json, limits, target.emplace<int>());

@@ -146,6 +146,7 @@ TENSORRAY_VALUE(std::filesystem::path);
 TENSORRAY_VALUE(Word);
 TENSORRAY_VALUE(Eigen::Matrix3d);      ///< A list of rows.
 TENSORRAY_VALUE(std::vector<double>);  ///< A list, or one number.
+TENSORRAY_VALUE(std::vector<std::string>);
 using IntegerOrThree = std::variant<int, Eigen::Vector3i>;
 TENSORRAY_VALUE(IntegerOrThree);
 

@@ -13,6 +13,7 @@
 #include "renderer/color/color.h"
 #include "renderer/spectra/spectrum.h"
 #include "volumes/files/tensor_files.h"
+#include "volumes/files/voxel_images.h"
 
 namespace tensorray {
 namespace {
@@ -32,10 +33,32 @@ void write_display(const std::filesystem::path& file, const Scene& scene, const 
   write_image(file, display_image(scene, render, holds_alpha(file)), metadata);
 }
 
+/// The picture as its EXR has it.
+Image exr_of(const Image& linear, const OutputDescription& output) {
+  std::vector<std::size_t> kept;
+  std::vector<std::string> names;
+  for (std::size_t c = 0; c < linear.channels.size(); ++c) {
+    const std::string layer = layer_of(linear.channels[c]);
+    const auto is_layer = [&](const std::string& wanted) { return wanted == layer; };
+    if (output.exr_layers && !layer.empty() &&
+        std::none_of(output.exr_layers->begin(), output.exr_layers->end(), is_layer))
+      continue;
+    kept.push_back(c);
+    names.push_back(linear.channels[c]);
+  }
+  Image image(linear.width, linear.height, names);
+  image.has_half_colors = output.exr_type == ExrType::half;
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = linear.pixels[i / kept.size() * linear.channels.size() + kept[i % kept.size()]];
+  return image;
+}
+
 void write_linear(const std::filesystem::path& file, const Scene& scene, const Render& render) {
   ImageMetadata metadata = provenance(scene, render);
   metadata["chromaticities"] = fmt::format("{}", fmt::join(scene.color.working_chromaticities(), " "));
-  write_image(file, render.linear, metadata);
+  const OutputDescription& output = scene.description.output;
+  if (!output.exr_layers && output.exr_type == ExrType::single) return write_image(file, render.linear, metadata);
+  write_image(file, exr_of(render.linear, output), metadata);
 }
 
 void write_spectral(const std::filesystem::path& file, const Scene& scene, const Render& render) {
@@ -43,6 +66,25 @@ void write_spectral(const std::filesystem::path& file, const Scene& scene, const
   metadata["chromaticities"] = fmt::format("{}", fmt::join(scene.color.working_chromaticities(), " "));  // Of R, G, B.
   metadata.insert(render.spectral->metadata.begin(), render.spectral->metadata.end());
   write_image(file, render.spectral->image, metadata);
+}
+
+/// The channels of a picture on a plate as volumes of one slice, moved along the light into the middle of the field and
+/// as thick as the field, so that they lie on it.
+void write_maps(const std::filesystem::path& file, const Scene& scene, const Render& render) {
+  const Plate& plate = *render.view->plate;
+  const Eigen::Vector3d V = scene.description.light.direction->normalized();
+  const DepthRange range = depth_range(scene.field, plate.center, V);
+  VoxelImage maps;
+  maps.size = {render.linear.width, render.linear.height, 1};
+  maps.names = render.linear.channels;
+  const Eigen::Vector2d pixel = plate.pixel_size();
+  maps.to_world.linear() << pixel.x() * plate.right, pixel.y() * plate.up, (range.far - range.near) * plate.normal();
+  maps.to_world.translation() = plate.to_world({0.5, plate.resolution.y() - 0.5}) + 0.5 * (range.near + range.far) * V;
+  const std::size_t channels = maps.names.size();
+  for (std::size_t channel = 0; channel < channels; ++channel)
+    for (int y = render.linear.height - 1; y >= 0; --y)  // Rows of pictures come from the top.
+      for (int x = 0; x < render.linear.width; ++x) maps.values.push_back(render.linear.pixel(x, y)[channel]);
+  write_voxel_image(file, maps);
 }
 
 constexpr double unseen = 0.5;  // Grey of wavelengths that the eye does not see.
@@ -111,6 +153,11 @@ Output spectral_output() {
   return {"spectral", "spectral picture, one channel for each band", {".exr"}, write_spectral, ".spectral.exr"};
 }
 
+Output maps_output() {
+  return {"maps", "the channels of the EXR as volumes of one slice within the field", voxel_image_endings(),
+          write_maps};
+}
+
 ImageMetadata provenance(const Scene& scene, const Render& render) {
   ImageMetadata metadata = render.metadata;
   metadata.insert({{"Software", "tensorray " TENSORRAY_VERSION},
@@ -169,7 +216,7 @@ void write_grids(const std::filesystem::path& file, const Scene& scene, const Re
   write_scalar_vdb(file, render.grids, provenance(scene, render));
 }
 
-PictureView picture_view(const Plate& plate) { return {plate.right, plate.up, plate.pixel_size().x()}; }
+PictureView picture_view(const Plate& plate) { return {plate.right, plate.up, plate.pixel_size().x(), plate}; }
 
 PictureView picture_view(const Camera& camera) {
   PictureView view{camera.right, camera.up, {}};

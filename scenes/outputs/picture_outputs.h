@@ -20,6 +20,9 @@ std::vector<Output> picture_outputs(const std::vector<Output>& more = {});
 /// "spectral", for methods whose light has bands.
 Output spectral_output();
 
+/// "maps", for methods whose pixels are those of a plate.
+Output maps_output();
+
 /// The picture as a display shows it: R, G, B, and A if there is one.
 /// @param holds_alpha  Whether the file format has an alpha. Colours are then divided by alpha, as such formats need
 ///                     them. Otherwise they stay multiplied by it, which shows the picture on black.

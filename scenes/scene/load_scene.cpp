@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -12,8 +13,10 @@
 #include "renderer/meshes/mesh.h"
 #include "scenes/description/choices.h"
 #include "scenes/scene/scene.h"
+#include "scenes/scene/turning.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/making/field_making.h"
+#include "volumes/making/noise.h"
 #include "volumes/making/smoothing.h"
 
 namespace tensorray {
@@ -30,13 +33,17 @@ constexpr int most_resolution = 2048;     // ... are not more than this.
 constexpr double narrowest_plate = 0.25;  // Its shorter side, as a part of the longer one, where the size is not given.
 constexpr double visible = 0.02;          // AutoScale::shown; a picture that shows less looks empty.
 constexpr double much_less = 0.5;         // Of the best AutoScale::shown: reason to name that scale.
+constexpr double erased = 0.5;            // Of a field's variation: less is left where smoothing erases structure.
 constexpr double much = 1;                // AutoScale::median_turn, radians.
 
 BlockSource open_field(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
   if (!field.generate && has_number_sign(field.file.filename().string()) && !std::filesystem::exists(field.file))
     throw SceneError(field.file.string() + ": # is for the number of a frame: give --frames");
-  if (!field.generate) return open_tensor_vdb(field.file, field.name, field.derive, field.components);
+  if (!field.generate) {
+    BlockSource blocks = open_tensor_vdb(field.file, field.name, field.derive, field.components);
+    return scene.world.up == UpAxis::z ? blocks : turned(std::move(blocks), scene.turn());
+  }
   try {
     require_memory_for(field.generate->grid, 65);  // With the bricks.
     return generator_source(field.generate->generator, field.generate->grid);
@@ -65,8 +72,8 @@ LoadedField load_field(const SceneDescription& scene, const Progress& progress) 
       key, [&] { return prepare_field(open_field(scene), choices_of(scene), source_of(scene)); }, progress);
 }
 
-TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
-  TriangleMesh mesh = read_mesh(path);
+TriangleMesh load_closed_mesh(const SceneDescription& scene, const std::filesystem::path& path) {
+  TriangleMesh mesh = read_mesh(path, scene.turn());
   try {
     require_closed(mesh);
   } catch (const std::invalid_argument& error) {
@@ -218,7 +225,7 @@ Surfaces load_volume(const SceneDescription& description, const TensorField& fie
   Surfaces surfaces;
   surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
   if (const auto* mesh = std::get_if<std::filesystem::path>(&description.field.bounds))
-    surfaces.cut = load_closed_mesh(*mesh);
+    surfaces.cut = load_closed_mesh(description, *mesh);
   else if (ends_at_surface(description, field))
     surfaces.cut = closed_surface(field.surface(), source_of(description));
   return surfaces;
@@ -227,7 +234,8 @@ Surfaces load_volume(const SceneDescription& description, const TensorField& fie
 /// Loads the volume, the obstacles and the plate. Moves the start of `beam` before all of them.
 Surfaces load_surfaces(const SceneDescription& description, const TensorField& field, Beam& beam) {
   Surfaces surfaces = load_volume(description, field);
-  for (const std::filesystem::path& path : description.obstacles) surfaces.obstacles.push_back(read_mesh(path));
+  for (const std::filesystem::path& path : description.obstacles)
+    surfaces.obstacles.push_back(read_mesh(path, description.turn()));
   surfaces.plate = make_plate(description, field, beam);
   require_near(beam, description, field);
   require_near(*surfaces.plate, "/receiver", description, field);
@@ -250,11 +258,19 @@ std::string advice_on(const AutoScale& given, const AutoScale& best) {
 AutoScale load_scale(const SceneDescription& description, const TensorField& field, const Geometry& geometry,
                      const Beam& beam, double flexibility, const Progress& progress, std::vector<std::string>& notes) {
   const std::optional<double>& given = description.field.scale;
-  if (!description.integrator.method().bends_light()) return AutoScale{given.value_or(1)};
+  if (!description.integrator.method().bends_light() || (given && !description.judges_scale))
+    return AutoScale{given.value_or(1)};
   const Geometry volume({geometry.surfaces().bounds, geometry.surfaces().cut, std::nullopt, {}});
   const Beam light = silhouette_beam(field.corners(), beam.direction, beam.up);
-  const AutoScale scale = given ? judge_scale(field, volume, light, *given, flexibility, progress)
-                                : choose_scale(field, volume, light, progress);
+  AutoScale scale = given ? judge_scale(field, volume, light, *given, flexibility, progress)
+                          : choose_scale(field, volume, light, progress);
+  const auto view = description.integrator.method().view_through(description, field.world_box().center());
+  if (!given && view && view->norm() > 0) {  // Both what light shows and what is seen: the mean of their scales.
+    const Beam seen = silhouette_beam(field.corners(), *view, beam.up);
+    const AutoScale by_view = choose_scale(field, volume, seen, progress);
+    const double mean = scale.shown > 0 ? std::sqrt(scale.scale * by_view.scale) : by_view.scale;
+    if (by_view.shown > 0) scale = judge_scale(field, volume, light, mean, probe_flexibility, progress);
+  }
   if (scale.greatest_turn == 0) {
     notes.push_back(
         fmt::format("warning: no probe ray is turned (the field is zero or isotropic, or light travels along its "
@@ -342,9 +358,9 @@ LoadedField with_notes(MadeField made, const std::string& source) {
         source, beyond));
   if (is_coarse(made.resolution))
     notes.push_back(fmt::format(
-        "warning: {}: voxels are too coarse: linear and cubic interpolation differ by {:.0f}% of the field's "
-        "norm in one of 100 cells; sample the field more finely, or smooth it",
-        source, 100 * made.resolution.percentile_99));
+        "warning: {}: voxels are too coarse, or have noise: linear and cubic interpolation differ by {:.0f}% of the "
+        "field's norm in one of 10 cells, {:.0f}% in one of 100; sample the field more finely, or smooth it",
+        source, 100 * made.resolution.percentile_90, 100 * made.resolution.percentile_99));
   if (eigenvalues.defective > 0)
     notes.push_back(fmt::format("{} voxels hold a defective tensor, preprocessed by its limit", eigenvalues.defective));
   if (eigenvalues.norm_lost > 0.01)
@@ -426,6 +442,7 @@ FieldChoices choices_of(const SceneDescription& description) {
   const bool stops = !description.obstacles.empty() || !word;
   FieldChoices choices;
   choices.smoothing = field.smooth;
+  choices.noise = field.noise;
   choices.eigenvalues = field.eigenvalues;
   const bool extends = is_free ? stops : field.border == BorderChoice::extend;
   choices.interpolant = {field.interpolation, extends ? Border::extend : Border::fade};
@@ -441,14 +458,23 @@ LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const
     return prepare_field(without, choices, source);
   }
   if (!blocks.surface.triangles.empty()) choices.interpolant.border = choices.at_surface;
-  if (choices.smoothing == 0) return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source);
+  if (choices.smoothing == 0 && !choices.noise)
+    return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source);
   TensorGrid grid = to_grid(blocks);
   const std::size_t non_finite = remove_non_finite(grid);
+  if (choices.noise) keep_noise(grid);
+  const double before = variation(grid);
   smooth(grid, choices.smoothing);
+  const double kept = before > 0 ? variation(grid) / before : 1;
   MadeField made = make_field(source_of(std::move(grid)), choices.eigenvalues, choices.interpolant);
   made.non_finite += non_finite;
   LoadedField loaded = with_notes(std::move(made), source);
-  loaded.notes.push_back(fmt::format("field smoothed: a Gaussian of {:g} voxels", choices.smoothing));
+  if (choices.noise) loaded.notes.push_back("field: its noise alone, in random order, and no structure");
+  if (choices.smoothing > 0)
+    loaded.notes.push_back(
+        fmt::format("{}field smoothed: a Gaussian of {:g} voxels leaves {:.0f}% of its variation{}",
+                    kept < erased && !choices.noise ? "warning: " : "", choices.smoothing, 100 * kept,
+                    kept < erased && !choices.noise ? "; if that was no noise, smooth it less" : ""));
   return loaded;
 }
 
@@ -460,6 +486,7 @@ std::string field_key(const SceneDescription& description) {
   }
   const FieldChoices choices = choices_of(description);
   return nlohmann::json{field,
+                        description.world.up,
                         identity_of(description.field.file),
                         choices.interpolant.between,
                         choices.interpolant.border,

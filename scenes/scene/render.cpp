@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "scenes/scene/scene.h"
+#include "scenes/scene/turning.h"
 
 namespace tensorray {
 namespace {
@@ -21,8 +22,8 @@ void warn_of_step_limit(Render& render) {
 
 /// Where an annotation has no meaning for a picture.
 void warn_of_annotations(const Scene& scene, Render& render) {
-  if (!render.view) return;
   const OutputDescription& output = scene.description.output;
+  if (!render.view || output.default_annotations) return;
   if (output.wants(Annotation::scale) && !render.view->pixel_size)
     render.warnings.push_back(
         "`/output/annotations`: a picture of a perspective camera has no single scale, and gets no scale bar; choose "
@@ -54,7 +55,12 @@ void gather_counts(Ranks* ranks, Statistics& statistics) {
 }
 
 Render render(const Scene& scene, const Progress& progress, RenderJob* job) {
+  const bool is_turned = scene.description.world.up == UpAxis::y;
+  const Eigen::Matrix3d back = scene.description.turn().transpose();
+  if (is_turned && job && job->show)
+    job->show = [show = job->show, back](Render so_far) { show(turned(std::move(so_far), back)); };
   Render result = scene.method->render(scene, progress, job);
+  if (is_turned) result = turned(std::move(result), back);
   warn_of_step_limit(result);
   warn_of_annotations(scene, result);
   return result;

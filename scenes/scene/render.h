@@ -18,6 +18,7 @@
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
 #include "renderer/light_maps/photon_map.h"
+#include "renderer/surfaces/plate.h"
 #include "tracing/bending/bending.h"
 #include "tracing/paths/paths.h"
 #include "volumes/grids/tensor_grid.h"
@@ -55,6 +56,7 @@ bool nothing_arrived(const Statistics& statistics);
 struct PictureView {
   Eigen::Vector3d right, up;         ///< Unit; along x of the picture, and against its y.
   std::optional<double> pixel_size;  ///< Of all pixels along x, world units; none: of a perspective camera.
+  std::optional<Plate> plate = {};   ///< That has the pixels; none: of a camera.
 };
 
 struct Render {

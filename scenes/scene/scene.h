@@ -70,6 +70,7 @@ struct LoadedField {
 /// What is made of a field's voxels.
 struct FieldChoices {
   double smoothing = 0;  ///< Deviation of a Gaussian, voxels; 0: none.
+  bool noise = false;    ///< Whether only the noise of the field is kept, before it is smoothed.
   Eigenvalues eigenvalues = Eigenvalues::automatic;
   Interpolant interpolant;
   bool keeps_surface = true;           ///< Whether the field ends at its surface, if it has one.
@@ -77,8 +78,8 @@ struct FieldChoices {
 };
 
 inline bool operator!=(const FieldChoices& a, const FieldChoices& b) {
-  return a.smoothing != b.smoothing || a.eigenvalues != b.eigenvalues || a.interpolant != b.interpolant ||
-         a.keeps_surface != b.keeps_surface || a.at_surface != b.at_surface;
+  return a.smoothing != b.smoothing || a.noise != b.noise || a.eigenvalues != b.eigenvalues ||
+         a.interpolant != b.interpolant || a.keeps_surface != b.keeps_surface || a.at_surface != b.at_surface;
 }
 
 FieldChoices choices_of(const SceneDescription& description);

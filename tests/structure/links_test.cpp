@@ -115,21 +115,21 @@ TEST(Links, LeadFromTheReadmeToEachPageForUsers) {
       }
 }
 
-/// The table of docs/dev/interfaces.md, the newcomer's page: paths exist, and types are in a file of the same row.
 /// Each test that the list of promises names is there.
 TEST(Links, OfThePromisesNameTests) {
   std::string sources;
   for (const fs::path& file : test::files_of_project())
     if (file.extension() == ".cpp" && fs::relative(file, test::source_folder()).begin()->string() == "tests")
-      sources += test::read_file(file);
+      sources += bytes_of(file);
   static const std::regex name("`([A-Z]\\w*)\\.([A-Z]\\w*)`");
-  const std::string page = test::read_file(test::source_folder() / "docs" / "dev" / "promises.md");
+  const std::string page = bytes_of(test::source_folder() / "docs" / "dev" / "promises.md");
   std::size_t count = 0;
   for (std::sregex_iterator match(page.begin(), page.end(), name), end; match != end; ++match, ++count)
     EXPECT_NE(sources.find("(" + (*match)[1].str() + ", " + (*match)[2].str() + ")"), std::string::npos) << (*match)[0];
   EXPECT_GT(count, 30u);
 }
 
+/// The table of docs/dev/interfaces.md, the newcomer's page: paths exist, and types are in a file of the same row.
 TEST(Links, OfTheInterfacesNameWhatExists) {
   static const std::regex code("`([^`]*)`");
   std::ifstream page(test::source_folder() / "docs" / "dev" / "interfaces.md");

@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   benchmark::AddCustomContext("processor", processor());
   add_rays();
+  add_polariscope();
   add_renders();
   add_view();
   RatioReporter reporter;

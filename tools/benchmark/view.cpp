@@ -1,6 +1,6 @@
 /// @file tools/benchmark/view.cpp
-/// Seconds from a page's message with a changed scale to a picture's bytes, without the network: the first, coarse
-/// picture and the finished one.
+/// Seconds from a page's message with a changed scale, or a turned analyser, to a picture's bytes, without the network:
+/// the first, coarse picture and the finished one, with its phases.
 
 #include <condition_variable>
 #include <cstring>
@@ -53,7 +53,7 @@ class TimedPage {
   Json header_ = Json::object();
 };
 
-void change_scale(benchmark::State& state, const std::string& file, bool finished) {
+void change(benchmark::State& state, const std::string& file, bool finished) {
   const ViewedScene viewed{std::filesystem::path(TENSORRAY_SCENES) / file,
                            {"receiver.resolution=[512,512]"},
                            std::filesystem::temp_directory_path() / "tensorray_bench.view.json"};
@@ -61,20 +61,26 @@ void change_scale(benchmark::State& state, const std::string& file, bool finishe
   Pages pages(viewed, progress);
   TimedPage page(pages);
   Json scene = scene_json(viewed.file, viewed.overrides);
-  const double scale = page.picture_of(scene, true).at("/chosen/field/scale"_json_pointer);
+  const Json chosen = page.picture_of(scene, true).at("chosen");
+  const bool turns = scene["integrator"]["type"] == "polariscope";
   int change = 0;
   for (auto _ : state) {
-    scene["field"]["scale"] = scale * (1 + 0.01 * ++change);
-    page.picture_of(scene, finished);
+    if (turns)
+      scene["integrator"]["analyzer"] = ++change;
+    else
+      scene["field"]["scale"] = chosen.at("/field/scale"_json_pointer).get<double>() * (1 + 0.01 * ++change);
+    const Json header = page.picture_of(scene, finished);
+    for (const auto& [phase, seconds] : header.at("phases").items()) state.counters[phase] = seconds.get<double>();
   }
 }
 
 }  // namespace
 
 void add_view() {
-  for (const char* const name : {"point_load_photons", "point_load_lens", "hemisphere_photons_side"})
+  for (const char* const name :
+       {"point_load_photons", "point_load_lens", "hemisphere_photons_side", "point_load_polariscope"})
     for (const bool finished : {false, true}) {
-      const auto run = [=](benchmark::State& state) { change_scale(state, std::string(name) + ".json", finished); };
+      const auto run = [=](benchmark::State& state) { change(state, std::string(name) + ".json", finished); };
       benchmark::RegisterBenchmark(
           (std::string("view/") + name + (finished ? "/finished_picture" : "/first_picture")).c_str(), run)
           ->Iterations(finished ? 3 : 20)

@@ -51,8 +51,16 @@ void add_import_options(CLI::App& command, ImportChoices& choices) {
                                       std::pair("--frame", "The axes of the components, likewise"),
                                       std::pair("--voxel-size", "The largest edge of a voxel, likewise"),
                                       std::pair("--levels", "Most sizes of voxels, likewise"),
-                                      std::pair("--resolution", "Voxels along the longest edge, likewise")})
+                                      std::pair("--resolution", "Voxels along the longest edge, likewise"),
+                                      std::pair("--mask", "A file that is 0 where there is no tensor, likewise")})
     command.add_option(flag, choices[flag], meaning)->group("Import");
+}
+
+void add_field_options(CLI::App& command, ImportChoices& choices, std::vector<std::string>& overrides) {
+  add_import_options(command, choices);
+  command.add_option_function<std::string>(
+      "--smooth", [&](const auto& text) { overrides.push_back("field.smooth=" + text); },
+      "Smooth the field by a Gaussian whose deviation is so many voxels, as `field.smooth` does");
 }
 
 std::string flags_of(const ImportChoices& choices) {
@@ -85,6 +93,7 @@ bool needs_import(const std::filesystem::path& path) {
   if (path.extension() == ".vdb" || lower_case_ending(path) == ".json") return false;
   std::error_code none;
   // What is not a regular file, such as a pipe, cannot be looked into and read again.
+  if (std::filesystem::is_directory(path, none)) return true;  // A case of OpenFOAM.
   return std::filesystem::is_regular_file(path, none) && !begins_as_scene(path);
 }
 

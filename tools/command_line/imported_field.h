@@ -22,6 +22,9 @@ using ImportChoices = std::map<std::string, std::string>;
 /// Adds these options to a command. `choices` must outlive it.
 void add_import_options(CLI::App& command, ImportChoices& choices);
 
+/// These, and options that change the scene's field.
+void add_field_options(CLI::App& command, ImportChoices& choices, std::vector<std::string>& overrides);
+
 /// The options as they were given, each after a blank.
 std::string flags_of(const ImportChoices& choices);
 

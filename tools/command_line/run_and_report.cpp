@@ -12,6 +12,7 @@
 
 #include "base/process/child_program.h"
 #include "base/process/process_limits.h"
+#include "base/text/habits.h"
 #include "base/text/text.h"
 #include "tools/command_line/tell.h"
 
@@ -59,6 +60,13 @@ __attribute__((section(".preinit_array"), used)) void (*const before_libraries)(
 Progress progress;
 std::atomic<bool> picture_request{false};
 
+/// For a message that names an option which is not there: the key that does what it does elsewhere.
+std::string advice_on_option(const std::string& message) {
+  const std::size_t begin = message.find("--"), end = message.find(' ', begin);
+  const std::string here = begin == std::string::npos ? "" : name_here(message.substr(begin, end - begin));
+  return here.empty() ? " (--help says more)" : "; it is a key of the scene, for --set: " + here;
+}
+
 void on_interrupt(int) {
   progress.cancelled = true;
   std::signal(SIGINT, SIG_DFL);
@@ -84,7 +92,7 @@ int run_and_report(const std::function<void()>& work) {
   } catch (const CLI::RuntimeError& child) {  // The child has printed the error.
     return child.get_exit_code();
   } catch (const CLI::ParseError& error) {
-    return report(std::string(error.what()) + " (--help says more)", wrong_input);
+    return report(error.what() + advice_on_option(error.what()), wrong_input);
   } catch (const Cancelled&) {
     return report("interrupted; nothing was written", interrupted);
   } catch (const Interrupted& error) {

@@ -2,6 +2,8 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -11,18 +13,22 @@
 #include "base/files/output_file.h"
 #include "base/process/progress.h"
 #include "base/text/text.h"
+#include "tools/command_line/imported_field.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/command_line/vdb_output.h"
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
+#include "volumes/files/voxel_images.h"
 #include "volumes/tensors/invariants.h"
 
 namespace tensorray {
 namespace {
 
 struct DeriveOptions {
-  std::filesystem::path input, output;
+  std::vector<std::filesystem::path> files;
+  ImportChoices import;
+  std::filesystem::path input, output;  ///< The input: the file, or the field made of the files.
   std::string field;
   std::vector<std::string> invariants;
 };
@@ -44,15 +50,37 @@ std::map<std::string, std::string> file_metadata(const TensorGrid& field) {
   return metadata;
 }
 
-void derive(const DeriveOptions& options, const Progress& progress) {
+bool is_voxel_image(const std::filesystem::path& file) {
+  const std::vector<std::string>& endings = voxel_image_endings();
+  return std::find(endings.begin(), endings.end(), lower_case_ending(file)) != endings.end();
+}
+
+std::string check_derived(const std::string& text) {
+  if (is_voxel_image(text) || check_vdb_output(text).empty()) return "";
+  return text + " must end in .vdb, " + joined(voxel_image_endings());
+}
+
+/// The number of voxels along the axes of the file that was imported; zeros: not known.
+Eigen::Vector3i imported_size(const TensorGrid& field) {
+  const auto found = field.metadata.find("tensorray:voxels");
+  Eigen::Vector3i size = Eigen::Vector3i::Zero();
+  std::istringstream text(found == field.metadata.end() ? "" : found->second);
+  text >> size.x() >> size.y() >> size.z();
+  return size;
+}
+
+void derive(DeriveOptions options, const Progress& progress) {
   const Threads threads;
+  const std::optional<ImportedField> imported = import_field(options.files, options.import, false);
+  const std::filesystem::path& given = options.files.front();
+  options.input = imported ? imported->path() : given;
   const std::vector<Invariant> invariants = chosen_invariants(options);
-  require_distinct_files({{options.input, "the field"}}, {{options.output, "-o"}});
+  require_distinct_files({{given, "the field"}}, {{options.output, "-o"}});
   OutputFile file(options.output);
   progress.update("reading", 0, 1);
   TensorGrid field = read_tensor_vdb(options.input, options.field);
   const std::size_t removed = remove_non_finite(field);
-  if (field.blocks.empty()) throw std::runtime_error(options.input.string() + ": no voxel of the field is finite");
+  if (field.blocks.empty()) throw std::runtime_error(given.string() + ": no voxel of the field is finite");
   field.metadata.emplace("tensorray:field", field.name);
   std::vector<ScalarGrid> grids;
   for (const Invariant which : invariants) {
@@ -60,18 +88,20 @@ void derive(const DeriveOptions& options, const Progress& progress) {
     grids.push_back(invariant_grid(which, field));
   }
   progress.update("writing", 0, 1);
-  file.write(
-      [&](const std::filesystem::path& path) { write_scalar_vdb(path, grids, file_metadata(field), field.surface); });
+  file.write([&](const std::filesystem::path& path) {
+    if (is_voxel_image(options.output))
+      write_voxel_image(path, voxel_image(grids, imported_size(field)));
+    else
+      write_scalar_vdb(path, grids, file_metadata(field), field.surface);
+  });
   const auto bytes = static_cast<double>(std::filesystem::file_size(file.path()));
   progress.update("writing", 1, 1);
   file.commit();
 
   if (removed > 0)
-    tell({fmt::format("warning: {}: {} voxels are not finite and are left out", options.input.string(), removed)},
-         false);
+    tell({fmt::format("warning: {}: {} voxels are not finite and are left out", given.string(), removed)}, false);
   if (!field.finer.empty())
-    tell({fmt::format("{}: the field has {} levels; the grids are of level 0", options.input.string(),
-                      field.finer.size() + 1)},
+    tell({fmt::format("{}: the field has {} levels; the grids are of level 0", given.string(), field.finer.size() + 1)},
          false);
   std::vector<std::string> names;
   for (const ScalarGrid& grid : grids) names.push_back(grid.name);
@@ -84,7 +114,8 @@ void derive(const DeriveOptions& options, const Progress& progress) {
 void add_derive_command(CLI::App& program, Progress& progress) {
   const auto options = std::make_shared<DeriveOptions>();
   CLI::App* command = program.add_subcommand("derive", "Make float grids of a tensor field's invariants");
-  command->add_option("file", options->input, "The tensor field, FIELD.vdb")->required();
+  command->add_option("file", options->files, "The tensor field, FIELD.vdb, or files that `tensorray import` reads")
+      ->required();
   command
       ->add_option("--invariant", options->invariants,
                    "What to derive; may be given several times: " + joined(invariant_names()) +
@@ -93,10 +124,13 @@ void add_derive_command(CLI::App& program, Progress& progress) {
       ->type_name("NAME")
       ->allow_extra_args(false);
   command->add_option("--name", options->field, "Name of the field; not needed where there is only one");
-  command->add_option("-o,--output", options->output, "The file to write, FILE.vdb")
+  command
+      ->add_option("-o,--output", options->output,
+                   "The file to write, .vdb; or with the voxels of the field: .nii .nrrd .mif .vti")
       ->required()
-      ->check(check_vdb_output)
+      ->check(check_derived)
       ->type_name("FILE");
+  add_import_options(*command, options->import);
   command->callback([options, &progress] { derive(*options, progress); });
 }
 

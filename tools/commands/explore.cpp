@@ -104,6 +104,7 @@ std::vector<std::string> common_changes(const ExploreOptions& options) {
   for (const char* key : {"light.up", "light.aperture", "receiver.center", "receiver.normal", "receiver.up",
                           "receiver.size", "receiver.resolution"})
     changes.push_back(std::string(key) + "=null");
+  changes.emplace_back("output.annotations=[]");  // Pictures are small.
   return changes;
 }
 
@@ -151,10 +152,12 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
     Scene next = load_scene(description, progress, field_of(scene, description));
     scene.emplace(std::move(next));
   };
-  load(with(options, {"light.direction=[0,0,-1]"}));
+  SceneDescription first = with(options, {"light.direction=[0,0,-1]", "field.scale=1"});
+  first.judges_scale = false;
+  load(first);
   const std::vector<Eigen::Vector3d> directions = directions_of(*scene, progress);
   for (std::size_t column = 0; column < columns; ++column) {
-    const Eigen::Vector3d& V = directions[column];
+    const Eigen::Vector3d V = scene->description.turn().transpose() * directions[column];
     const std::string direction = fmt::format("light.direction=[{},{},{}]", V.x(), V.y(), V.z());
     load(with(options, {direction}));
     const Strength strength = scene->method->strength(*scene);
@@ -170,7 +173,9 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
       changes.insert(changes.end(),
                      {direction, scaled, pixels, fmt::format("camera.resolution=[{0},{0}]", options.size),
                       fmt::format("integrator.stretch.pixels={}", options.size)});
-      load(with(options, changes));
+      SceneDescription cell = with(options, changes);
+      cell.judges_scale = false;
+      load(cell);
       visit(column, row, static_cast<int>(row * columns + column) + 1, name_of(V), *scene,
             with(options, {direction, scaled}));
     }
@@ -255,7 +260,7 @@ void add_explore_command(CLI::App& program, Progress& progress) {
       ->check(CLI::Range(1, static_cast<int>(factors.size() * columns)));
   command->add_option("--save-scene", options->scene_copy, "Write the scene of --pick to this JSON file");
   command->add_option("--threads", options->threads, "Number of threads (all)")->check(CLI::Range(1, 4096));
-  add_import_options(*command, options->import);
+  add_field_options(*command, options->import, options->overrides);
   command->add_flag("-q,--quiet", options->quiet, "Print nothing but errors");
   command->callback([options, &progress] { explore(*options, progress); });
 }

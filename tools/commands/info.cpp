@@ -22,6 +22,7 @@
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/making/field_making.h"
+#include "volumes/making/smoothing.h"
 #include "volumes/tensors/statistics.h"
 
 namespace tensorray {
@@ -37,6 +38,7 @@ struct InfoOptions {
   std::filesystem::path field_file;  ///< The file, or the field made of the files.
   std::string field;
   Derive derive = Derive::none;
+  double smooth = 0;  ///< Voxels.
   bool json = false;
 };
 
@@ -56,6 +58,10 @@ struct FieldInfo {
 
 FieldInfo field_info(const InfoOptions& options, const std::string& name) {
   TensorGrid grid = read_tensor_vdb(options.field_file, name, options.derive);
+  if (options.smooth > 0) {
+    remove_non_finite(grid);
+    smooth(grid, options.smooth);
+  }
   FieldInfo info{grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid), grid.surface, {}};
   if (info.statistics.active_voxels > info.statistics.non_finite) {
     const Border border = grid.surface.triangles.empty() ? Border::fade : Border::extend;
@@ -118,6 +124,7 @@ Json to_json(const FieldInfo& field) {
   json["deviator_max"] = s.deviator_max;
   json["linear_to_cubic"] = {{"cells", field.resolution.cells},
                              {"median", field.resolution.median},
+                             {"percentile_90", field.resolution.percentile_90},
                              {"percentile_99", field.resolution.percentile_99},
                              {"too_coarse", is_coarse(field.resolution)}};
   // Infinite for a field that does not bend light. JSON has no number for that and gets null.
@@ -192,10 +199,12 @@ void print_tensors(const FieldStatistics& s) {
 
 void print_resolution(const Resolution& resolution) {
   if (resolution.cells == 0) return;
-  print_row("between voxels", fmt::format("linear and cubic differ by {} of the norm (median), {} (99 % of the cells)",
-                                          percent(resolution.median), percent(resolution.percentile_99)));
+  print_row(
+      "between voxels",
+      fmt::format("linear and cubic differ by {} of the norm (median), {} (90 % of the cells), {} (99 %)",
+                  percent(resolution.median), percent(resolution.percentile_90), percent(resolution.percentile_99)));
   if (is_coarse(resolution))
-    print_row("", "too coarse to trust: structures are about two voxels wide; sample it more finely, or smooth it");
+    print_row("", "too coarse to trust, or noise: structures of two voxels; sample it more finely, or smooth it");
 }
 
 void print_field(const FieldInfo& field) {
@@ -225,7 +234,7 @@ void print_text(const InfoOptions& options, const std::vector<GridInfo>& grids, 
 
 void info(InfoOptions options) {
   const Threads threads;
-  const std::optional<ImportedField> imported = import_field(options.files, options.import, false);
+  const std::optional<ImportedField> imported = import_field(options.files, options.import, options.json);
   options.field_file = imported ? imported->path() : options.files.front();
   if (!imported) {
     std::signal(SIGINT, SIG_DFL);  // This command writes no file, so Ctrl-C may end it at once.
@@ -252,6 +261,8 @@ void add_info_command(CLI::App& program) {
       ->transform(CLI::Transformer(std::map<std::string, Derive>{
           {"gradient", Derive::gradient}, {"hessian", Derive::hessian}, {"viscous_stress", Derive::viscous_stress}}));
   add_import_options(*command, options->import);
+  command->add_option("--smooth", options->smooth, "Smooth the field first, by so many voxels (`field.smooth`)")
+      ->check(CLI::Range(0.0, max_smoothing));
   command->add_flag("--json", options->json, "As JSON");
   command->callback([options] { info(*options); });
 }

@@ -26,6 +26,7 @@ struct RenderOptions {
   std::string error;
   ImportChoices import;
   std::string frames, shard;
+  bool split = false;
   RenderRun run;
 };
 
@@ -86,6 +87,26 @@ void report_failed(const std::vector<int>& failed) {
                                        fmt::join(failed, ",")));
 }
 
+/// PICTURE.noise.png of PICTURE.png.
+std::filesystem::path noise_file(std::filesystem::path file) {
+  const std::string ending = file.extension().string();
+  return file.replace_extension(".noise" + ending);
+}
+
+/// Renders a scene, and beside its pictures those of the field's noise alone, in the same light, if `split` is set.
+void render_and_split(const std::filesystem::path& scene, SceneChanges changes, RenderRun run, bool split,
+                      Progress& progress) {
+  if (split && (changes.outputs.empty() || run.keeping.shard || run.ranks))
+    throw std::invalid_argument("--split: name the pictures with -o; it is not for shards, frames and ranks");
+  const std::vector<std::string> chosen = render_scene(scene, changes, run, progress);
+  if (!split) return;
+  changes.overrides.insert(changes.overrides.end(), chosen.begin(), chosen.end());
+  changes.overrides.emplace_back("field.noise=true");
+  for (std::filesystem::path& output : changes.outputs) output = noise_file(output);
+  run.statistics = run.scene_copy = "";
+  render_scene(scene, changes, run, progress);
+}
+
 /// Renders other programs' files. Its pictures are named after the first.
 void render_import(SceneChanges changes, const RenderOptions& options, Progress& progress) {
   const std::filesystem::path& file = options.files.front();
@@ -96,7 +117,7 @@ void render_import(SceneChanges changes, const RenderOptions& options, Progress&
     throw std::invalid_argument("--save-scene: a scene needs a field that stays; make it with `tensorray import " +
                                 printable(file.string()) + flags_of(options.import) + " -o FIELD.vdb`");
   if (changes.outputs.empty()) {
-    std::filesystem::path name(file);
+    std::filesystem::path name = file.has_filename() ? file : file.parent_path();
     while (name.has_extension()) name.replace_extension();  // .nii.gz
     changes.outputs = {name.string() + ".png", name.string() + ".exr"};
   }
@@ -110,7 +131,7 @@ void render_import(SceneChanges changes, const RenderOptions& options, Progress&
   const ImportedField field(options.files, choices, options.run.quiet);
   RenderRun run = options.run;
   run.keeping.is_on = false;  // The field does not stay.
-  render_scene(field.path(), changes, run, progress);
+  render_and_split(field.path(), changes, run, options.split, progress);
 }
 
 /// @param ranks  Null: this process is alone. @return frames that failed, where the run keeps going.
@@ -131,9 +152,10 @@ std::vector<int> render(const RenderOptions& options, Ranks* ranks, Progress& pr
     throw std::invalid_argument("--save-scene: not for several frames");
   if (is_root(ranks)) broadcast(ranks, true);
   if (options.frames.empty()) {
-    render_scene(scene, changes, run, progress);
+    render_and_split(scene, changes, run, options.split, progress);
     return {};
   }
+  if (options.split) throw std::invalid_argument("--split: not for several frames");
   return render_frames(scene, changes, parse_frames(options.frames), run, progress);
 }
 
@@ -183,6 +205,10 @@ void add_render_command(CLI::App& program, Progress& progress) {
                       "photon_distribution: refine until the picture's relative error is below this, as 1%");
   command->add_option("--stats", options->run.statistics, "Write statistics of the render to this JSON file");
   command->add_option("--save-scene", options->run.scene_copy, "Write the scene, with its changes, to this JSON file");
+  command->add_flag(
+      "--split", options->split,
+      "Of measured fields: render the noise of the field alone, too, in the same light, to NAME.noise.png "
+      "of NAME.png: what both pictures show is noise");
   CLI::Option* frames =
       command->add_option("--frames", options->frames,
                           "Render these frames, as 1-240, 1-240x2 or 1,3,7-9: # in names of files is the "
@@ -213,7 +239,7 @@ void add_render_command(CLI::App& program, Progress& progress) {
       ->transform(CLI::AsSizeValue(false))
       ->option_text("SIZE");
   command->add_flag("--watch", options->run.keeping.watch, "Keep the pictures up to date while they are rendered");
-  add_import_options(*command, options->import);
+  add_field_options(*command, options->import, options->changes.overrides);
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");
   command->callback([options, &progress] { render_alone_or_with_others(*options, progress); });
 }

@@ -1,6 +1,9 @@
 #include "tools/import/import_file.h"
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
 #include <new>
 #include <stdexcept>
 #include <utility>
@@ -54,20 +57,48 @@ OpenLattice lattice_reader(const std::filesystem::path& path) {
 /// Whether the user asks for voxels of a size or a number; the first kind of a resolution is none.
 bool wants_sampling(const ImportSettings& settings) { return settings.sampling.resolution.index() > 0; }
 
-/// Keeps only the voxels whose centres are in `bounds`, except for rounding.
-void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {
-  const Eigen::Vector3d rounding = Eigen::Vector3d::Constant(1e-6 * grid.to_world.linear().colwise().norm().minCoeff());
-  bounds = {bounds.min() - rounding, bounds.max() + rounding};
+/// Keeps only the voxels whose centres `keeps` wants.
+void keep_voxels(TensorGrid& grid, const std::function<bool(const Eigen::Vector3d& center)>& keeps) {
   tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
     TensorBlock& block = grid.blocks[i];
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       const Eigen::Vector3i index = block.origin + TensorBlock::position(offset);
-      if (!block.active[offset] || bounds.contains(grid.to_world * index.cast<double>())) continue;
+      if (!block.active[offset] || keeps(grid.to_world * index.cast<double>())) continue;
       block.active.reset(offset);
       block.values[offset].setZero();
     }
   });
   remove_empty_blocks(grid);
+}
+
+/// Those in `bounds`, except for rounding.
+void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {
+  const Eigen::Vector3d rounding = Eigen::Vector3d::Constant(1e-6 * grid.to_world.linear().colwise().norm().minCoeff());
+  bounds = {bounds.min() - rounding, bounds.max() + rounding};
+  keep_voxels(grid, [&](const Eigen::Vector3d& center) { return bounds.contains(center); });
+}
+
+/// Those in voxels of the mask that are not 0.
+void apply_mask(TensorGrid& grid, const std::filesystem::path& file) {
+  const OpenLattice open = lattice_reader(file);
+  if (open != open_nifti && open != open_mrtrix)
+    throw std::invalid_argument("--mask " + file.string() + ": must be a NIfTI or MRtrix image (.nii .nii.gz .mif)");
+  const Lattice mask = open == open_nifti ? open_nifti_mask(file) : open_mrtrix_mask(file);
+  if (mask.components != 1) fail(file, "--mask: it has several volumes, and a mask has one");
+  const std::size_t slice = std::size_t(mask.size.x()) * std::size_t(mask.size.y());
+  std::vector<double> values(slice);
+  std::vector<char> inside(slice * std::size_t(mask.size.z()));
+  for (int z = mask.size.z() - 1; z >= 0; --z) {
+    mask.read_slice(z, values.data());
+    std::transform(values.begin(), values.end(), inside.begin() + std::ptrdiff_t(slice) * z,
+                   [](double value) { return value != 0 && std::isfinite(value); });
+  }
+  const Eigen::Affine3d to_mask = mask.to_world.inverse();
+  keep_voxels(grid, [&](const Eigen::Vector3d& center) {
+    const Eigen::Array3i at = (to_mask * center).array().round().cast<int>();
+    if ((at < 0).any() || (at >= mask.size.array()).any()) return false;
+    return inside[slice * std::size_t(at.z()) + std::size_t(at.y() * mask.size.x() + at.x())] != 0;
+  });
 }
 
 /// Changes every tensor of a level.
@@ -121,6 +152,8 @@ TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings
       return tensor_of_gradient(settings.take, G.cast<double>()).cast<float>();
     });
   if (settings.sampling.bounds) crop(grid, *settings.sampling.bounds);
+  if (!settings.mask.empty()) apply_mask(grid, settings.mask);
+  grid.metadata["tensorray:voxels"] = fmt::format("{} {} {}", lattice.size.x(), lattice.size.y(), lattice.size.z());
   grid.name = lattice.array;
   report.lattice->active = grid.active_voxels();
   warn_of_fills(report.lattice->fills, report.lattice->voxels, report);
@@ -154,8 +187,16 @@ void add_surface(vtkDataSet& mesh, const ImportSettings& settings, const Progres
   report.surface->area = 0;
 }
 
+/// Of a plate or a shell; 0: there is none, or no surface is made.
+double thickness_of(vtkDataSet& mesh) {
+  const BodySurface surface = body_surface(mesh, std::numeric_limits<double>::infinity());
+  return surface.area > 0 && surface.open_edges == 0 ? 2 * surface.mesh.volume() / surface.area : 0;
+}
+
 TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportSettings& settings,
                        const Progress& progress, ImportReport& report) {
+  if (!settings.mask.empty())
+    throw std::invalid_argument("is a mesh, whose field ends with it: leave --mask out, or give --bounds");
   const SilentVtk silent;
   report.mesh_cells = static_cast<std::size_t>(data.GetNumberOfCells());
   if (!settings.boundary.empty()) {
@@ -175,9 +216,12 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
     fills.add(tuple.data(), values.GetNumberOfComponents());
   }
   warn_of_fills(fills, static_cast<std::size_t>(values.GetNumberOfTuples()), report);
-  TensorGrid grid = sample_mesh(*mesh, settings.sampling, progress, *report.mesh);
+  SamplingSettings sampling = settings.sampling;
+  const bool has_surface = settings.surface && !vtkImageData::SafeDownCast(&data);
+  if (has_surface && !wants_sampling(settings)) sampling.thickness = thickness_of(*mesh);
+  TensorGrid grid = sample_mesh(*mesh, sampling, progress, *report.mesh);
   grid.name = array.name;
-  if (settings.surface && !vtkImageData::SafeDownCast(&data)) add_surface(*mesh, settings, progress, grid, report);
+  if (has_surface) add_surface(*mesh, settings, progress, grid, report);
   return grid;
 }
 
@@ -364,6 +408,8 @@ TensorGrid import_tensors(const ImportSettings& given, const Progress& progress,
   } catch (const std::exception& error) {
     throw std::runtime_error(about(file, error.what(), report));
   }
+  if (grid.blocks.empty() && !settings.mask.empty())
+    throw std::invalid_argument(file.string() + ": --mask: no voxel is inside that has a tensor");
   if (grid.blocks.empty() && settings.sampling.bounds)
     throw std::invalid_argument(file.string() + ": --bounds: no voxel is inside that has a tensor");
   if (grid.blocks.empty())

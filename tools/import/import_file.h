@@ -32,8 +32,9 @@ struct ImportSettings {
   std::optional<Eigen::Vector3d> origin;  ///< World position of the first voxel's centre; of .npy only.
   std::optional<ComponentFrame> frame;    ///< Axes of the components, where the file does not state them; of RAS files.
   std::optional<int> step;                ///< Of the steps of time, from 0 on; none: the last one.
-  std::filesystem::path boundary;         ///< File for the surface of the body; empty: none.
-  bool surface = true;                    ///< Whether the grid of a mesh gets the surface of the body that the mesh is.
+  std::filesystem::path mask;      ///< Of files of voxels: a file with a number for each, 0 outside; empty: none.
+  std::filesystem::path boundary;  ///< File for the surface of the body; empty: none.
+  bool surface = true;             ///< Whether the grid of a mesh gets the surface of the body that the mesh is.
 };
 
 /// What was found in the files and how it was converted. Only one of the two reports is filled.

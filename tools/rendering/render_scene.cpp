@@ -63,10 +63,18 @@ std::string run_statistics(const Scene& scene, const Statistics& statistics, dou
 std::string scene_as_rendered(const Scene& scene) {
   auto json = parse_value(scene.description.text);
   json["field"]["scale"] = scene.scale.scale;
-  const Eigen::Vector3d& V = *scene.description.light.direction;
+  const Eigen::Vector3d V = scene.description.turn().transpose() * *scene.description.light.direction;
   if (json.contains("light") && json["light"].value("direction", Json()) == "auto")
     json["light"]["direction"] = {V.x(), V.y(), V.z()};
   return json.dump(2) + "\n";
+}
+
+std::vector<std::string> choices_for(const Scene& scene) {
+  const Eigen::Vector3d& V = *scene.description.light.direction;
+  std::vector<std::string> changes{fmt::format("light.direction=[{},{},{}]", V.x(), V.y(), V.z())};
+  const Strength strength = scene.method->strength(scene);
+  if (!strength.is_fixed) changes.push_back(fmt::format("{}.{}={}", strength.section, strength.key, strength.value));
+  return changes;
 }
 
 /// Renders what is left of the job. @throw Interrupted if it is cancelled, but some of its work is kept: with the
@@ -196,16 +204,19 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
   return scene;
 }
 
-void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
-                  Progress& progress) {
+std::vector<std::string> render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes,
+                                      const RenderRun& run, Progress& progress) {
   const Threads threads(run.threads);
   set_image_threads(static_cast<int>(running_threads()));
-  if (!is_root(run.ranks)) return render_with_root(*run.ranks, run, progress);
+  if (!is_root(run.ranks)) {
+    render_with_root(*run.ranks, run, progress);
+    return {};
+  }
   const SceneDescription description = read_scene(scene_file, changes);
   refuse_number_signs(description, run);
   bound_memory_of(run, description);
   if (is_field_file(scene_file)) tell({"scene: " + description.text}, run.quiet);
-  render_to_files(description, run, {}, progress);
+  return choices_for(render_to_files(description, run, {}, progress));
 }
 
 void merge_shards(const SceneDescription& description, WorkFile shards, const RenderRun& run, Progress& progress) {

@@ -46,9 +46,10 @@ struct RenderRun {
 /// progress bar and notes. Of ranks, only the root reads the file, prints and writes.
 /// The work is kept in a checkpoint beside the first output, PICTURE.checkpoint, while the render runs, and where it is
 /// interrupted, with the picture so far.
+/// @return changes that fix what was chosen: the direction of the light, and the strength (LoadedMethod::strength).
 /// @throw SceneError, std::invalid_argument, std::runtime_error, Cancelled; Interrupted.
-void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
-                  Progress& progress);
+std::vector<std::string> render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes,
+                                      const RenderRun& run, Progress& progress);
 
 /// Renders frames of a scene (see set_frame), one after the other; of ranks, each renders every so many. The scale and
 /// the direction `auto` are those of the first frame. A field that does not change is loaded once.

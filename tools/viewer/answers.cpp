@@ -79,6 +79,20 @@ std::vector<Vector3d> lattice(const Beam& beam, int along_side) {
   return positions;
 }
 
+/// All lists of numbers but indices, as positions or directions, in the axes of the scene's file.
+Json in_axes_of(const Scene& scene, Json json, const std::string& key = "") {
+  if (scene.description.world.up == UpAxis::z || key == "triangles" || !json.is_structured()) return json;
+  const Eigen::Matrix3d back = scene.description.turn().transpose();
+  const bool is_list = json.is_array() && !json.empty() && json[0].is_number();
+  for (std::size_t i = 0; is_list && i + 2 < json.size(); i += 3) {
+    const Vector3d vector = back * Vector3d(json[i], json[i + 1], json[i + 2]);
+    for (std::size_t axis = 0; axis < 3; ++axis) json[i + axis] = vector[static_cast<int>(axis)];
+  }
+  for (auto& [name, value] : json.items())
+    if (!is_list) value = in_axes_of(scene, std::move(value), name);
+  return json;
+}
+
 Json describe_mesh(const TriangleMesh& mesh, const std::string& name) {
   Json positions = Json::array(), triangles = Json::array();
   for (const Vector3d& vertex : mesh.vertices)
@@ -160,18 +174,18 @@ Json describe_field(const Scene& scene) {
   const Eigen::Vector3i size = (voxels.sizes() + Vector3d::Ones()).array().round().matrix().cast<int>();
   Json corners = Json::array();
   for (const Vector3d& corner : scene.field.corners()) corners.push_back(to_json(corner));
-  return {{"voxels", {size.x(), size.y(), size.z()}}, {"corners", std::move(corners)}};
+  return {{"voxels", {size.x(), size.y(), size.z()}}, {"corners", in_axes_of(scene, std::move(corners))}};
 }
 
 Json describe_choices(const Scene& scene, const Render& render) {
   const Plate& plate = *scene.geometry.surfaces().plate;
   double far = -std::numeric_limits<double>::infinity();
   for (const Vector3d& corner : scene.field.corners()) far = std::max(far, corner.dot(scene.beam.direction));
-  Json receiver = {{"normal", to_json(plate.normal())}, {"size", {plate.size.x(), plate.size.y()}}};
+  Json receiver = {{"normal", in_axes_of(scene, to_json(plate.normal()))}, {"size", {plate.size.x(), plate.size.y()}}};
   if (!scene.description.receiver.center) receiver["distance"] = plate.center.dot(scene.beam.direction) - far;
   const Strength strength = scene.method->strength(scene);
   return {{strength.section, {{strength.key, strength.value}}},
-          {"light", {{"direction", to_json(scene.beam.direction)}}},
+          {"light", {{"direction", in_axes_of(scene, to_json(scene.beam.direction))}}},
           {"receiver", std::move(receiver)},
           {"output",
            {{"exposure", display_exposure(scene, render)},
@@ -190,11 +204,11 @@ Json describe_space(const Scene& scene, bool with_meshes) {
     add_rays(scene, channel, scene.channels[channel].flexibility, starts, rays);
   Json plate = Json::array();
   for (const Vector3d& corner : scene.geometry.surfaces().plate->corners()) plate.push_back(to_json(corner));
-  return {{"plate", std::move(plate)},
-          {"beam", describe_beam(scene)},
-          {"rays", std::move(rays)},
-          {"meshes", with_meshes ? describe_meshes(scene) : Json()},
-          {"camera", describe_camera(scene)}};
+  return in_axes_of(scene, {{"plate", std::move(plate)},
+                            {"beam", describe_beam(scene)},
+                            {"rays", std::move(rays)},
+                            {"meshes", with_meshes ? describe_meshes(scene) : Json()},
+                            {"camera", describe_camera(scene)}});
 }
 
 LandedRays::LandedRays(const Scene& scene) : starts_(lattice(scene.beam, cells + 1)) {
@@ -232,7 +246,7 @@ Json LandedRays::to(const Scene& scene, const Vector2d& place) const {
       }
     add_rays(scene, channels[c], colours_[c].flexibility, starts, rays);
   }
-  return rays;
+  return in_axes_of(scene, std::move(rays));
 }
 
 Json describe_pixel(const Render& render, const Image& display, const Vector2d& place) {

@@ -9,6 +9,7 @@
 
 #include "base/constants.h"
 #include "base/process/job.h"
+#include "renderer/coverage/area_deposit.h"
 #include "renderer/lights/beam.h"
 #include "tracing/flow/flow_map.h"
 #include "tracing/flow/wavelength_tracer.h"
@@ -93,6 +94,36 @@ Plate part_of(const Plate& plate, Eigen::AlignedBox2d box, int resolution) {
   return part;
 }
 
+/// Adds to each pixel of a plate the part of it on which the beam's straight light lands, times `weight`.
+void add_straight(const Beam& beam, const Plate& plate, float weight, std::vector<float>& straight) {
+  std::vector<Vector2d> outline;
+  for (const Vector2d& corner : beam.aperture) {
+    const Vector3d start = beam.start(corner), direction = beam.direction_at(start);
+    const double way = plate.normal().dot(plate.center - start) / plate.normal().dot(direction);
+    if (!(way > 0) || !std::isfinite(way)) return;  // Light along the plate.
+    outline.push_back(plate.to_pixel(start + way * direction));
+  }
+  const int width = plate.resolution.x(), height = plate.resolution.y();
+  const double unit = std::max(std::abs(area(outline)), double(width) * height);  // Pixels of the power 1.
+  AreaDeposit deposit(width, height);
+  for (std::size_t i = 1; i + 1 < outline.size(); ++i) {
+    const Vector2d &a = outline[0], &b = outline[i], &c = outline[i + 1];
+    const double density = deposit.triangle(a, b, c, std::abs(area({a, b, c})) / unit);
+    deposit.add_edge(a, b, density);
+    deposit.add_edge(b, c, density);
+    deposit.add_edge(c, a, density);
+  }
+  deposit.flush();
+  std::vector<double> row(static_cast<std::size_t>(width));
+  straight.resize(row.size() * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y) {
+    AreaDeposit::read_row({&deposit}, y, 0, row.data());
+    for (std::size_t x = 0; x < row.size(); ++x)
+      straight[static_cast<std::size_t>(y) * row.size() + x] +=
+          weight * static_cast<float>(std::clamp(row[x] * unit, 0.0, 1.0));
+  }
+}
+
 /// For the flexibilities of the light, as a range if they differ.
 FlowSettings flow_settings(const LandingLight& light, const Plate& plate, const FlowIrradianceSettings& wanted) {
   const auto [least, greatest] = std::minmax_element(light.flexibilities.begin(), light.flexibilities.end());
@@ -164,8 +195,9 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
   Ranks* const ranks = settings.job ? settings.job->ranks : nullptr;
   for (int pass = 0; pass < light.passes; ++pass) {
     Film irradiance;  // Of this direction.
+    const Beam beam = beam_of(field, surfaces, plate, light, pass);
+    add_straight(beam, result.plate, 1.0f / static_cast<float>(light.passes), result.straight);
     const auto make = [&] {
-      const Beam beam = beam_of(field, surfaces, plate, light, pass);
       const FlowMap map = trace_flow_map(field, geometry, beam, settings.bending, tracing, progress);
       CausticSettings drawing;
       drawing.channels = channels;

@@ -37,8 +37,9 @@ struct FlowIrradiance {
   Plate plate;      ///< The part of the surface where light lands, with its pixels.
   Film irradiance;  ///< A plane for each band; 1 is the irradiance of the beam on a surface that faces it; of a point
                     ///< light, that at a distance of 1.
-  std::vector<float> folds;  ///< Number of sheets of the map at the middle of each pixel, for light of the middle of
-                             ///< the range, from the first direction.
+  std::vector<float> straight;  ///< The part of each pixel on which light through the volume would land without field.
+  std::vector<float> folds;     ///< Number of sheets of the map at the middle of each pixel, for light of the middle of
+                                ///< the range, from the first direction.
 };
 
 /// Traces the flow map of the light that enters the volume to the plane of `plate`, or to the body of `surfaces`.

@@ -109,13 +109,14 @@ BlockSource with_finite(const BlockSource& source, const Pass& pass) {
 
 Vector3i corner_of_cell(int i) { return {i & 1, i >> 1 & 1, i >> 2 & 1}; }
 
-/// Whether all voxels of the cell that begins at `first` are in the block and active.
-bool is_cell(const BlockShape& block, const Vector3i& first) {
-  if (first.maxCoeff() + 1 >= TensorBlock::size) return false;
-  for (int i = 0; i < 8; ++i) {
-    const Vector3i at = first + corner_of_cell(i);
-    if (!block.active[static_cast<std::size_t>(TensorBlock::offset(at.x(), at.y(), at.z()))]) return false;
-  }
+/// Whether all voxels of the cell that begins at `first`, and `about` voxels about it, are in the block and active.
+bool is_cell(const BlockShape& block, const Vector3i& first, int about) {
+  const Vector3i from = first - Vector3i::Constant(about), to = first + Vector3i::Constant(1 + about);
+  if (from.minCoeff() < 0 || to.maxCoeff() >= TensorBlock::size) return false;
+  for (int x = from.x(); x <= to.x(); ++x)
+    for (int y = from.y(); y <= to.y(); ++y)
+      for (int z = from.z(); z <= to.z(); ++z)
+        if (!block.active[static_cast<std::size_t>(TensorBlock::offset(x, y, z))]) return false;
   return true;
 }
 
@@ -149,20 +150,22 @@ Comparison compare(TensorSampler& sampler, const TensorField& field, const Vecto
   return {(mean - cubic).norm(), cubic.norm()};
 }
 
-/// Of a cubic field. @param shapes  Of its blocks. Cells between blocks are not compared. Runs on all threads; the
-/// result does not depend on their number.
-Resolution measure_resolution(const TensorField& field, const std::vector<BlockShape>& shapes) {
-  constexpr std::size_t count = 4096;  // Taken evenly from all blocks; enough for a 99th percentile.
+/// Of a cubic field. @param shapes  Of its blocks. Cells between blocks are not compared. @param about  Voxels about
+/// a cell that must be active. Runs on all threads; the result does not depend on their number.
+Resolution measure_resolution(const TensorField& field, const std::vector<BlockShape>& shapes, int about) {
+  constexpr std::size_t count = 8192;  // Taken evenly from all blocks; enough for a 99th percentile.
   std::vector<Comparison> compared(count);
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t n) {
     const BlockShape& block = shapes[n * shapes.size() / count];
     const Vector3i first = TensorBlock::position(static_cast<int>(scattered(n) % TensorBlock::voxels));
-    if (!is_cell(block, first)) return;
+    if (!is_cell(block, first, about)) return;
     TensorSampler sampler(field);
     compared[n] = compare(sampler, field, block.origin + first);
   });
   compared.erase(std::remove_if(compared.begin(), compared.end(), [](const auto& c) { return c.difference < 0; }),
                  compared.end());
+  constexpr std::size_t few = 100;
+  if (about > 0 && compared.size() < few) return measure_resolution(field, shapes, 0);
   Resolution result;
   result.cells = compared.size();
   double squares = 0;
@@ -174,6 +177,7 @@ Resolution measure_resolution(const TensorField& field, const std::vector<BlockS
     return compared[percent * (compared.size() - 1) / 100].difference / norm;
   };
   result.median = part(50);
+  result.percentile_90 = part(90);
   result.percentile_99 = part(99);
   return result;
 }
@@ -198,7 +202,8 @@ MadeField make_field(const BlockSource& source, Eigenvalues mode, const Interpol
   }
   result.voxels = active_voxels(current.shapes);
   for (const BlockLevel& level : current.finer) result.finer_voxels.push_back(active_voxels(level.shapes));
-  if (result.field && result.field->is_cubic()) result.resolution = measure_resolution(*result.field, current.shapes);
+  if (result.field && result.field->is_cubic())
+    result.resolution = measure_resolution(*result.field, current.shapes, 1);
   return result;
 }
 

@@ -15,14 +15,19 @@ namespace tensorray {
 /// How far linear and cubic interpolation differ in the middles of cells: ‖T_linear − T_cubic‖ (Frobenius) as a part of
 /// the root mean square of ‖T_cubic‖ there. Halving the voxels divides it by four where voxels resolve the field.
 struct Resolution {
-  std::size_t cells = 0;  ///< Number of cells that were compared; 0: none has eight active voxels.
-  double median = 0, percentile_99 = 0;
+  /// Number of cells that were compared: those with 4³ active voxels about them, or, if there are few, 2³; so that what
+  /// interpolation does at the field's border does not count. 0: there are none.
+  std::size_t cells = 0;
+  double median = 0, percentile_90 = 0, percentile_99 = 0;
 };
 
-/// Above this, pictures depend on what was between the voxels and is not known: structures are about two voxels wide.
-constexpr double coarse = 0.1;
+/// Above these, pictures depend on what was between the voxels and is not known: noise, which is in all cells, or
+/// structures about two voxels wide, in a few. Sharp edges of what is resolved are below them.
+constexpr double coarse_90 = 0.05, coarse_99 = 0.25;
 
-inline bool is_coarse(const Resolution& resolution) { return resolution.percentile_99 > coarse; }
+inline bool is_coarse(const Resolution& resolution) {
+  return resolution.percentile_90 > coarse_90 || resolution.percentile_99 > coarse_99;
+}
 
 struct MadeField {
   std::optional<TensorField> field;  ///< Nothing if no voxel is finite.

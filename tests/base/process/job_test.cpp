@@ -1,6 +1,8 @@
 #include "base/process/job.h"
 
 #include <atomic>
+#include <cmath>
+#include <cstring>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -177,6 +179,38 @@ TEST(JobTest, ResultsAreFoundOrMade) {
   EXPECT_EQ(made, 2);
   Job damaged({}, {{"values", std::make_shared<const std::string>(32, 'x')}});
   EXPECT_THROW(find(damaged), DamagedArchive);
+}
+
+TEST(ArchiveTest, PacksWhatResemblesItself) {
+  struct Item {
+    double value;
+    int count, more;
+  };
+  std::vector<Item> items(1000), found(1000);
+  for (int i = 0; i < 1000; ++i) items[static_cast<std::size_t>(i)] = {std::sqrt(i), 7, i / 100};
+  Archive archive;
+  archive.copy_packed(items.data(), items.size(), sizeof(Item));
+  std::string bytes = archive.take();
+  EXPECT_LT(bytes.size(), items.size() * 9);
+  Archive back(bytes);
+  back.copy_packed(found.data(), found.size(), sizeof(Item));
+  back.finish();
+  EXPECT_EQ(std::memcmp(items.data(), found.data(), items.size() * sizeof(Item)), 0);
+  bytes[bytes.size() / 2] ^= 1;
+  for (const std::string& damaged : {bytes, bytes.substr(0, 100), std::string(8, 0)}) {
+    Archive wrong(damaged);
+    EXPECT_THROW(wrong.copy_packed(found.data(), found.size(), sizeof(Item)), DamagedArchive);
+  }
+}
+
+/// A checkpoint holds no light that is made more quickly than it is worth; a shard does, for others.
+TEST(JobTest, LightIsWorthItsTime) {
+  Job job;
+  job.interval = 60;
+  EXPECT_FALSE(job.is_worth(200'000'000, 60));
+  EXPECT_TRUE(job.is_worth(200'000'000, 200));
+  job.is_shard = true;
+  EXPECT_TRUE(job.is_worth(200'000'000, 60));
 }
 
 }  // namespace

@@ -44,6 +44,14 @@ SamplingSettings resolution(int count) {
   return settings;
 }
 
+double mesh_volume(vtkDataSet& mesh) {
+  MeshCell cell;
+  double volume = 0;
+  for (vtkIdType id = 0; id < mesh.GetNumberOfCells(); ++id)
+    if (cell.load(mesh, id)) volume += cell.volume();
+  return volume;
+}
+
 void expect_linear(const TensorGrid& grid) {
   double worst = 0;
   for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
@@ -105,8 +113,45 @@ TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
   EXPECT_EQ(report.size, Vector3i(7, 4, 2));
 
   sampled(*mesh, {}, report);  // the cells are 1/2 x 1/4 x 1/8: a cube of the same volume has an edge of 1/4
-  EXPECT_NEAR(report.voxel.x(), 0.25, 1e-9);
-  EXPECT_EQ(report.size, Vector3i(9, 5, 3));
+  EXPECT_TRUE(report.voxel.isApprox(Vector3d(0.25, 0.25, 0.125), 1e-9));
+  EXPECT_EQ(report.size, Vector3i(9, 5, 5));
+}
+
+// Without options, voxels are on the faces of a thin body, and there are four cells of them across it wherever it lies.
+TEST(MeshSampling, ThinBodiesGetVoxelsAcrossThem) {
+  struct Case {
+    const char* name;
+    Map map;
+    double thickness;
+    bool fills;  ///< Its box.
+  };
+  const auto turn = Eigen::AngleAxisd(0.6, Vector3d(1, 2, 3).normalized());
+  const Case cases[] = {
+      {"plate", [](const Vector3d& p) { return Vector3d(10 * p.x(), 7.3 * p.y(), 0.5 * p.z()); }, 0, true},
+      {"turned", [&](const Vector3d& p) { return turn * Vector3d(10 * p.x(), 7.3 * p.y(), 0.5 * p.z()); }, 0.45, false},
+      {"tube",
+       [](const Vector3d& p) {
+         const double r = 4 + 0.5 * p.z(), angle = 6.2 * p.y();
+         return Vector3d(r * std::cos(angle), r * std::sin(angle), 10 * p.x());
+       },
+       0.47, false}};
+  for (const Case& each : cases) {
+    SCOPED_TRACE(each.name);
+    const auto mesh = curvilinear({11, 41, 3}, each.map);
+    add_linear_tensor(*mesh);
+    SamplingSettings settings;
+    settings.thickness = each.thickness;
+    SamplingReport report;
+    const TensorGrid grid = sampled(*mesh, settings, report);
+    const Solid solid = solid_part(*mesh);
+    const Vector3d last = grid.to_world * (report.size - Vector3i::Ones()).cast<double>();
+    EXPECT_LT((grid.to_world.translation() - solid.bounds.min()).norm() + (last - solid.bounds.max()).norm(), 1e-9);
+    if (each.fills)
+      EXPECT_EQ(report.size.z(), 5);
+    else
+      EXPECT_LE(report.voxel.maxCoeff(), each.thickness / 4 * 1.001);
+    EXPECT_NEAR(report.volume, mesh_volume(*mesh), (each.fills ? 1e-6 : 0.1) * report.volume);
+  }
 }
 
 TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {

@@ -3,6 +3,7 @@
 #include "integrators/polariscope/polariscope.h"
 
 #include <cmath>
+#include <complex>
 
 #include <gtest/gtest.h>
 
@@ -130,8 +131,9 @@ TEST(Polariscope, StokesParametersKnowTheSenseOfCircularLight) {
   // who faces the light sees it turn the other way.
   const Analysis analysis = analysis_of({{{ElementKind::polarizer, 0}}, {{ElementKind::polarizer, 90}}}, 550);
   const Eigen::Vector4d S = analysis.stokes(retarder(pi / 2, pi / 4).toRotationMatrix());
-  const Eigen::Vector2cd jones =
-      jones_matrix({{ElementKind::polarizer, 0}, {ElementKind::quarter_wave, -45}}, 550) * Eigen::Vector2cd(1, 0);
+  // The plate of a quarter wave with its fast axis at −45°, along which light comes first: (1, −1) and (1, 1).
+  const std::complex<double> i(0, 1), along = std::exp(i * pi / 4.0), across = std::exp(-i * pi / 4.0);
+  const Eigen::Vector2cd jones((along + across) / 2.0, (across - along) / 2.0);
   // E exp(iωt): the phase of w before that of u is positive where w comes first.
   const double phase = std::arg(jones[1] / jones[0]);
   EXPECT_NEAR(std::abs(phase), pi / 2, 1e-12);
@@ -198,17 +200,22 @@ TEST(Polariscope, StepsOfTurningAxesHaveFourthOrder) {
   constexpr double d = 9, turn_of_axes = 2.5;
   std::vector<double> errors;
   for (const int count : {4, 8, 16}) {
-    TurningSteps steps;
+    std::vector<RayTurns> turns;
     const double h = 1.0 / count;
     for (int i = 0; i < count; ++i) {
-      const auto a = [&](double z) { return d / 2 * std::cos(2 * turn_of_axes * z); };
-      const auto b = [&](double z) { return d / 2 * std::sin(2 * turn_of_axes * z); };
-      const double z1 = (i + 0.5 - gauss_point) * h, z2 = (i + 0.5 + gauss_point) * h;
-      steps.add(h, a(z1), b(z1), a(z2), b(z2));
+      RaySteps steps;
+      for (const int point : {0, 1})
+        for (int ray = 0; ray < ray_lanes; ++ray) {
+          const double z = (i + 0.5 + (point == 0 ? -gauss_point : gauss_point)) * h;
+          steps.length[ray] = static_cast<float>(h);
+          steps.a[point][ray] = static_cast<float>(d / 2 * std::cos(2 * turn_of_axes * z));
+          steps.b[point][ray] = static_cast<float>(d / 2 * std::sin(2 * turn_of_axes * z));
+        }
+      add_steps(steps, 1, turns);
     }
     const std::vector<float> strengths(turning_room(1), 1.0f);
     std::vector<float> q(4 * strengths.size());
-    turn(steps, strengths.data(), strengths.size(), q.data());
+    turn(turns, 3, strengths.data(), strengths.size(), q.data());
     const Quaterniond found(q[0], q[strengths.size()], q[2 * strengths.size()], q[3 * strengths.size()]);
     EXPECT_NEAR(found.norm(), 1, 1e-6);
     errors.push_back(distance(found, twisted(d, turn_of_axes)));
@@ -300,7 +307,7 @@ double disc_error(int voxels) {
   const double orders = 3;                  // At the middle: σ₁ − σ₂ = 4/π.
   light.strength = pi * orders / (4 / pi);  // The slab is 1 thick.
   const Plate plate = plate_of(light, {150, 150}, 1.9);
-  const PolarView view(arrangement_of(ArrangementWord::circular), light.bands, turning_room(1));
+  const PolarView view(arrangement_of(ArrangementWord::circular), light.bands, {Vector3d::Ones()});
   double error = 0;
   for (int y = 0; y < 150; y += 7) {
     const LightRow row = row_of(field, light, plate, y);

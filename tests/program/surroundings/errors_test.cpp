@@ -51,6 +51,7 @@ TEST_F(Errors, ScenesAndCommandLines) {
       {"photograph", {"photograph"}},
       {"threads", {"render", "scene.json", "--threads", "0"}},
       {"threads", {"render", "scene.json", "--threads", "many"}},
+      {"--spp; it is a key of the scene, for --set: integrator.max_samples", {"render", "scene.json", "--spp", "64"}},
       {"one kind", {"render", "scene.json", "-o", "a.png", "-o", "b.jpg"}},
       {"--stats.*scene.json", {"render", "scene.json", "--stats", "scene.json"}},
       {"--stats.*a.png", {"render", "scene.json", "-o", "a.png", "--stats", "a.png"}},
@@ -60,6 +61,8 @@ TEST_F(Errors, ScenesAndCommandLines) {
   for (const auto& [pattern, arguments] : all) expect_error(2, pattern, arguments);
   // tests/scenes has all values.
   expect_scene_error(2, "unknown key `/lihgt`; did you mean `light`", "lihgt.photons=5");
+  expect_scene_error(2, "unknown key `/camera/fov`; here it is camera.angle", "camera.fov=30");
+  expect_scene_error(2, "unknown key `/integrator/spp`; here it is integrator.max_samples", "integrator.spp=64");
   expect_scene_error(2, "poisson_ratio", "field.generate.poisson_ratio=0.9");
   for (const char* size : {"1e15", "1e300"}) {
     expect_scene_error(2, "/receiver", fmt::format("receiver.size=[{0},{0}]", size));

@@ -259,6 +259,35 @@ TEST(PictureTest, TimeLimitsTheSamples) {
   EXPECT_EQ(samples_of(render_surfaces(world.scene, camera(20), settings)), std::vector<int>(20 * 20, 2));
 }
 
+/// A checkpoint has colours alone unless the bands are wanted; a shard has both. Whoever continues, the picture is the
+/// same; tiles without bands that are wanted now are rendered again.
+TEST(PictureTest, KeepsBandsWhereTheyAreWanted) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = settings.max_samples = 4;
+  const SurfacePicture all = render_surfaces(world.scene, camera(20), settings);
+  std::size_t sizes[2] = {};
+  for (const bool is_shard : {false, true}) {
+    Job job;
+    job.is_shard = is_shard;
+    RenderCallbacks callbacks;
+    callbacks.job = &job;
+    settings.spectral = false;
+    EXPECT_TRUE(render_surfaces(world.scene, camera(20), settings, callbacks).radiance.values.empty());
+    for (const auto& [name, bytes] : job.results()) sizes[is_shard ? 1 : 0] += bytes->size();
+    for (const bool spectral : {true, false}) {
+      settings.spectral = spectral;
+      Job next({}, job.results());
+      callbacks.job = &next;
+      const SurfacePicture picture = render_surfaces(world.scene, camera(20), settings, callbacks);
+      EXPECT_EQ(picture.color.values, all.color.values);
+      EXPECT_EQ(picture.radiance.values, spectral ? all.radiance.values : std::vector<double>());
+      EXPECT_EQ(next.results() == job.results(), is_shard || !spectral);
+    }
+  }
+  EXPECT_LT(sizes[0] + 20 * 20 * 3 * 4, sizes[1]);  // Three bands.
+}
+
 /// Within a tile: it stays as it was.
 TEST(PictureTest, IsCancelledWithinATile) {
   const World world = still_life();

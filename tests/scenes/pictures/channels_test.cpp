@@ -49,5 +49,28 @@ TEST_F(Channels, DocumentsListThoseOfEachMethod) {
   }
 }
 
+TEST_F(Channels, OfLayersThatAreChosen) {
+  write("scene.json", R"({
+    "field": {"generate": {"kind": "helix", "resolution": 9}, "scale": 0.6}, "camera": {"resolution": [8, 8]},
+    "lights": [{"kind": "directional", "group": "sun"}], "receiver": {"resolution": [8, 8]},
+    "integrator": {"type": "scene", "bands": 8, "max_samples": 1, "min_samples": 1,
+                   "caustic": {"resolution": 16, "rays": 100, "passes": 1}}})");
+  const auto made = [&](const Settings& changes) {
+    const Image whole = render_all(changes, {"a.exr"}).linear, file = read_image(in_folder("a.exr"));
+    for (const std::string& name : file.channels) {
+      const bool is_half = changes.size() > 1 && name != "Z" && name != "A";
+      const std::vector<float> exact = channel(whole, name), found = channel(file, name);
+      EXPECT_EQ(exact != found, is_half) << name;
+      for (std::size_t i = 0; i < exact.size(); ++i) EXPECT_NEAR(found[i], exact[i], 5e-4 * std::abs(exact[i]) + 1e-7);
+    }
+    return file.channels;
+  };
+  EXPECT_THAT(made({"output.exr_layers=[]"}), ::testing::UnorderedElementsAre("R", "G", "B", "A"));
+  EXPECT_THAT(made({"output.exr_layers=[\"Z\",\"sun\"]", "output.exr_type=half", "integrator.background=transparent"}),
+              ::testing::UnorderedElementsAre("R", "G", "B", "A", "Z", "sun.R", "sun.G", "sun.B"));
+  expect_error(2, "scene makes no layer \"normals\"; it makes Z, normal, albedo, .*, straight, sun",
+               {"output.exr_layers=[\"normals\"]"});
+}
+
 }  // namespace
 }  // namespace tensorray

@@ -26,6 +26,10 @@ Lattice open_nrrd(const std::filesystem::path& path);
 /// axes of the image, as lower triangles in those of the voxels, otherwise in world axes. Exactly zero is background.
 Lattice open_nifti(const std::filesystem::path& path);
 
+/// A mask: one volume.
+Lattice open_nifti_mask(const std::filesystem::path& path);
+Lattice open_mrtrix_mask(const std::filesystem::path& path);
+
 /// Reads MetaImage (.mha, .mhd with its data file; ITK) with three axes and 6, 9 or 3 (a vector) channels. World is
 /// RAS, of the file's LPS. Components are in LPS unless the user gives the frame; six are xx xy xz yy yz zz unless the
 /// user gives the order. Exactly zero is background.

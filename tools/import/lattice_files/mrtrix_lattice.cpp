@@ -33,7 +33,7 @@ std::vector<std::string> split(const std::string& text) {
 bool is_packed(const Path& path) { return ends_with(lower_case(path.string()), ".gz"); }
 
 /// Four extents: of x, y and z, and of the components.
-std::vector<std::int64_t> extents_of(const HeaderLines& header) {
+std::vector<std::int64_t> extents_of(const HeaderLines& header, bool is_mask) {
   std::vector<std::int64_t> extents;
   double product = 1;
   for (const double extent : header.numbers("dim")) {
@@ -41,6 +41,8 @@ std::vector<std::int64_t> extents_of(const HeaderLines& header) {
     if (!(extent >= 1) || extent != std::floor(extent) || product > 1e15) fail_header(header.path, "dim");
     extents.push_back(static_cast<std::int64_t>(extent));
   }
+  if (is_mask && extents.size() == 3) extents.push_back(1);
+  if (is_mask && extents.size() == 4 && extents[3] == 1) return extents;
   if (extents.size() != 4 || (extents[3] != 3 && extents[3] != 6 && extents[3] != 9))
     fail(header.path, "its size is " + escaped(header.text("dim")) +
                           ": a tensor has four axes, the last one of six or nine volumes, a vector three");
@@ -49,7 +51,8 @@ std::vector<std::int64_t> extents_of(const HeaderLines& header) {
 
 /// Sets the strides and the first number. `layout` has the rank of each axis, from the fastest on, and its sense.
 void set_layout(const HeaderLines& header, const std::vector<std::int64_t>& extents, RawVoxels& voxels) {
-  const std::vector<std::string> parts = split(header.text("layout"));
+  std::vector<std::string> parts = split(header.text("layout"));
+  if (parts.size() == 3 && extents[3] == 1) parts.emplace_back("+3");
   std::vector<int> axis_of_rank(4, -1);
   for (std::size_t axis = 0; axis < parts.size(); ++axis) {
     const double rank = std::abs(std::atof(parts[axis].c_str()));
@@ -113,13 +116,11 @@ Eigen::Affine3d to_world(const HeaderLines& header, const Eigen::Vector3i& size)
   return transform;
 }
 
-}  // namespace
-
-Lattice open_mrtrix(const Path& path) {
+Lattice open_image(const Path& path, bool is_mask) {
   require_file(path);
   const HeaderLines header = header_lines({path, 0, is_packed(path), 0}, ':', "END");
   if (header.text("file").empty()) fail(path, "is not an image of MRtrix, or cut off in its header");
-  const std::vector<std::int64_t> extents = extents_of(header);
+  const std::vector<std::int64_t> extents = extents_of(header, is_mask);
   for (int axis = 0; axis < 3; ++axis)
     if (extents[static_cast<std::size_t>(axis)] > std::numeric_limits<int>::max()) fail_header(path, "dim");
   Lattice lattice;
@@ -135,5 +136,10 @@ Lattice open_mrtrix(const Path& path) {
   lattice.read_slice = slices_of(std::move(voxels), lattice.size, lattice.components);
   return lattice;
 }
+
+}  // namespace
+
+Lattice open_mrtrix(const Path& path) { return open_image(path, false); }
+Lattice open_mrtrix_mask(const Path& path) { return open_image(path, true); }
 
 }  // namespace tensorray

@@ -93,11 +93,12 @@ bool has_matrices(const nifti_image& image) {
 
 /// Counts the components along the fourth axis, or along the fifth, which the format prescribes for vectors and
 /// matrices, or along both.
-int component_count(const nifti_image& image, const std::filesystem::path& path) {
+int component_count(const nifti_image& image, const std::filesystem::path& path, bool is_mask) {
   if (has_matrices(image)) return 9;
   const auto extent = [&](int axis) { return axis <= image.dim[0] ? image.dim[axis] : 1; };
   const std::int64_t four = extent(4), five = extent(5);
   const std::int64_t count = four > 1 ? four : five;
+  if (is_mask && count == 1) return 1;
   if ((count != 3 && count != 6 && count != 9) || four * five != count || extent(6) != 1 || extent(7) != 1)
     fail(path, fmt::format("its size is {} x {} x {} x {} x {}: a tensor has six or nine volumes, a vector three",
                            extent(1), extent(2), extent(3), four, five));
@@ -150,13 +151,11 @@ std::filesystem::path header_of(const std::filesystem::path& path) {
   return name;
 }
 
-}  // namespace
-
-Lattice open_nifti(const std::filesystem::path& given) {
+Lattice open_volumes(const std::filesystem::path& given, bool is_mask) {
   const std::filesystem::path path = header_of(given);
   const Image image = read_header(path);
   Lattice lattice;
-  lattice.components = component_count(*image, path);
+  lattice.components = component_count(*image, path, is_mask);
   for (int axis = 1; axis <= std::min<int>(3, static_cast<int>(image->dim[0])); ++axis)
     if (image->dim[axis] < 1 || image->dim[axis] > std::numeric_limits<int>::max())
       fail(path, "its NIfTI header is damaged: sizes");
@@ -181,5 +180,10 @@ Lattice open_nifti(const std::filesystem::path& given) {
   lattice.read_slice = slices_of(std::move(voxels), lattice.size, lattice.components);
   return lattice;
 }
+
+}  // namespace
+
+Lattice open_nifti(const std::filesystem::path& path) { return open_volumes(path, false); }
+Lattice open_nifti_mask(const std::filesystem::path& path) { return open_volumes(path, true); }
 
 }  // namespace tensorray

@@ -42,6 +42,8 @@ namespace {
 
 /// The fraction of the peak that sampling must keep; below it a warning is printed.
 constexpr double kept_peak = 0.95;
+/// The part of the body that voxels fill, below which a warning is printed.
+constexpr double filled = 0.8;
 /// The greatest part of voxels with a negative eigenvalue that is no reason for a warning: noise makes some.
 constexpr double max_negative = 0.2;
 
@@ -167,6 +169,12 @@ void print_surface(const BodySurface& surface, const TriangleMesh& triangles, do
                           triangles.triangles.size(), triangles.volume(),
                           surface.area > 0 ? fmt::format(", area {:.6g}", surface.area) : "",
                           100 * voxels / triangles.volume(), inner));
+  if (const double thickness = 2 * triangles.volume() / surface.area;
+      surface.open_edges == 0 && surface.area > 0 && voxels < filled * triangles.volume())
+    tell({fmt::format("tensorray: warning: voxels fill {:.0f}% of the body, whose field is continued from them to its "
+                      "surface; --voxel-size {:.2g}, a quarter of its thickness, fills it",
+                      100 * voxels / triangles.volume(), thickness / 4)},
+         false);
 }
 
 /// Progress as a line of phase, done and total, for a program that has started this one.
@@ -225,7 +233,7 @@ void require_replaceable(const std::filesystem::path& output) {
 }
 
 void check_files(const ImportOptions& options, const std::vector<std::filesystem::path>& read) {
-  std::vector<NamedFile> inputs;
+  std::vector<NamedFile> inputs{{options.settings.mask, "--mask"}};
   for (const std::filesystem::path& file : read) inputs.push_back({file, "the file to import"});
   require_distinct_files(inputs, {{options.output, "-o"}, {options.boundary, "--boundary"}});
   require_replaceable(options.output);
@@ -275,7 +283,9 @@ void import_all_steps(ImportOptions options, ImportSettings settings, Progress& 
 
 void import(const ImportOptions& options, Progress& progress) {
   ImportSettings settings = settings_of(options);
-  for (const std::filesystem::path& file : settings.files) {
+  std::vector<std::filesystem::path> inputs = settings.files;
+  if (!settings.mask.empty()) inputs.push_back(settings.mask);
+  for (const std::filesystem::path& file : inputs) {
     if (!std::filesystem::exists(file)) throw std::runtime_error(file.string() + " does not exist");
     if (is_device(file))
       throw std::runtime_error(file.string() + " is a pipe or a device; write what it gives to a file");
@@ -403,6 +413,10 @@ void add_import_options(CLI::App& program, Progress& progress) {
   program.add_option("-o,--output", options->output, "The field to write, FILE.vdb")
       ->required()
       ->check(check_vdb_output)
+      ->option_text("FILE");
+  program
+      .add_option("--mask", options->settings.mask,
+                  "Of files of voxels: a file with one number in each voxel; where it is 0, there is no tensor")
       ->option_text("FILE");
   program
       .add_option("--boundary", options->boundary,

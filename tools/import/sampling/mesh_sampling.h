@@ -18,13 +18,16 @@ namespace tensorray {
 
 struct SamplingSettings {
   /// The number of voxels along the longest edge (int), the numbers along x, y, z (>= 2 each), or the edge of a voxel
-  /// (double). If none is given, a voxel is about as large as the median cell, and fits between the two sides of a thin
-  /// mesh, with at most 2^21 voxels; on level 0 it is larger by a power of two where that fits the large cells.
+  /// (double). If none is given, a voxel is about as large as the median cell, with at most 2^21 voxels; on level 0 it
+  /// is larger by a power of two where that fits the large cells. Along each axis it is a little smaller, so that
+  /// voxels are on both faces of the box, and at least five across it.
   std::variant<std::monostate, int, Eigen::Vector3i, double> resolution;
   std::optional<int> levels;     ///< At most so many, 1 to max_levels; none: max_levels.
   std::optional<double> finest;  ///< The least edge of a voxel; none: that of the last level.
   std::optional<double> error;   ///< Of ‖T‖, as a part of the mesh's peak, from which on bricks are refined.
   std::optional<Eigen::AlignedBox3d> bounds;  ///< World; default: bounds of the three-dimensional cells.
+  double thickness =
+      0;               ///< Of the body: twice its volume by its area; 0: not known. A thin one has four voxels across.
   int flat_axis = -1;  ///< The axis across a slab (flat_mesh.h), along which there is one voxel; -1: none.
 };
 

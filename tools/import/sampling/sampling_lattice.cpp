@@ -58,6 +58,13 @@ Vector3d voxels_along(const Vector3d& edges, double voxel) {
   return (edges.array() / voxel + rounding).floor() + 1;
 }
 
+/// Voxels of at most an edge whose first and last centres are on the faces of a box, and at least five across it, so
+/// that the field of a thin body reaches its faces.
+Vector3d voxels_across(const Vector3d& edges, double voxel) {
+  constexpr double rounding = 1e-6, least = 4;
+  return (edges.array() / voxel - rounding).ceil().max(least) + 1;
+}
+
 /// Whether a lattice whose size the user did not set is small: of long thin ones, blocks have more voxels than it has.
 bool is_small(const Vector3d& voxels) {
   constexpr double block = 8;
@@ -81,11 +88,17 @@ double edge_by_volume(const Solid& solid, const AlignedBox3d& bounds) {
   return 0;
 }
 
+constexpr double across_thickness = 4;  ///< Voxels across a thin body, wherever its faces are.
+
+/// Whether a body is a plate or a shell: much thinner than its box, whose faces are not its own.
+bool is_thin(const SamplingSettings& settings, const AlignedBox3d& box) {
+  return settings.thickness > 0 && settings.thickness < box.sizes().minCoeff() / 4;
+}
+
 /// The voxels of level 0: twice as large, and so on, while that is no larger than the large cells, and fits in the box.
 double doubled(double voxel, const Solid& solid, const AlignedBox3d& box, const SamplingSettings& settings) {
-  double large = edge_by_volume(solid, box);
-  for (int axis = 0; axis < 3; ++axis)
-    if (axis != settings.flat_axis) large = std::min(large, box.sizes()[axis]);
+  double large = std::min(edge_by_volume(solid, box), box.sizes().maxCoeff());
+  if (is_thin(settings, box)) large = std::min(large, settings.thickness / across_thickness);
   for (int level = 1; level < settings.levels.value_or(max_levels) && 2 * voxel <= rounded_size * large; ++level)
     voxel *= 2;
   return voxel;
@@ -98,12 +111,12 @@ double largest_cell(const Solid& solid, const AlignedBox3d& box) {
   return voxel;
 }
 
-double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& box) {
+double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& box, const SamplingSettings& settings) {
   double voxel = std::min(typical_edge(mesh, solid, box), box.sizes().maxCoeff());
-  // Two across what is thin, if they are not too many.
-  if (const double thin = std::min(voxel, box.sizes().minCoeff()); is_small(voxels_along(box.sizes(), thin)))
+  if (const double thin = settings.thickness / across_thickness;
+      is_thin(settings, box) && thin < voxel && is_small(voxels_across(box.sizes(), thin)))
     voxel = thin;
-  while (!is_small(voxels_along(box.sizes(), voxel))) voxel *= 1.01;
+  while (!is_small(voxels_across(box.sizes(), voxel))) voxel *= 1.01;
   return voxel;
 }
 
@@ -197,13 +210,14 @@ SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const Sam
     size = voxels_along(box.sizes(), voxel);
     lattice.voxel.setConstant(voxel);
   };
-  std::visit(Overloaded{[&](std::monostate) {
-                          const bool is_amr = !settings.finest && settings.levels != 1 && is_adaptive(solid);
-                          const double least = settings.finest ? *settings.finest
-                                               : is_amr        ? largest_cell(solid, box)
-                                                               : chosen_voxel(mesh, solid, box);
-                          set_voxel(std::min(is_amr ? least : doubled(least, solid, box, settings), longest));
-                        },
+  const auto choose = [&] {
+    if (settings.finest) return set_voxel(std::min(doubled(*settings.finest, solid, box, settings), longest));
+    if (settings.levels != 1 && is_adaptive(solid)) return set_voxel(std::min(largest_cell(solid, box), longest));
+    const double voxel = doubled(chosen_voxel(mesh, solid, box, settings), solid, box, settings);
+    size = voxels_across(box.sizes(), voxel);
+    lattice.voxel = box.sizes().cwiseQuotient(size - Vector3d::Ones());
+  };
+  std::visit(Overloaded{[&](std::monostate) { choose(); },
                         [&](int count) {
                           require_two(count);
                           set_voxel(longest / (count - 1));

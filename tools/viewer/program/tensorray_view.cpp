@@ -63,7 +63,8 @@ std::vector<std::string> command_of(const ViewOptions& options) {
   std::vector<std::string> words{sibling_program("tensorray").string(), "render"};
   for (const std::filesystem::path& file : options.files) words.push_back(std::filesystem::absolute(file).string());
   for (const auto& [flag, value] : options.import)
-    if (!value.empty()) words.insert(words.end(), {flag, value});
+    if (!value.empty())
+      words.insert(words.end(), {flag, flag == "--mask" ? std::filesystem::absolute(value).string() : value});
   for (const std::string& change : options.viewed.overrides) words.insert(words.end(), {"--set", change});
   return words;
 }
@@ -126,7 +127,7 @@ int main(int argc, char** argv) {
   app.add_option("--host", options.server.hosts, "A further name by which browsers may call this machine")
       ->allow_extra_args(false);
   app.add_option("--threads", options.threads, "Number of threads (all)")->check(CLI::Range(1, 4096));
-  add_import_options(app, options.import);
+  add_field_options(app, options.import, options.viewed.overrides);
   app.add_flag("-q,--quiet", options.quiet, "Print only the address");
   return run_and_report([&] {
     try {
