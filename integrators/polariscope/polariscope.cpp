@@ -152,11 +152,11 @@ void PolarTracer::sample(Packet& packet) const {
     }
     sampler.sample(steps);
     if (room_ > 0) add_steps(steps, greatest_, packet.turns);
-    for (const int point : {0, 1})
-      for (std::size_t i = 0; i < ray_lanes; ++i) {
-        const float a = steps.a[point][i], b = steps.b[point][i];
-        packet.rays[i].phase += steps.length[i] * std::sqrt(a * a + b * b) / 2;
-      }
+    const auto difference = [&](int point, std::size_t i) {
+      return std::sqrt(steps.a[point][i] * steps.a[point][i] + steps.b[point][i] * steps.b[point][i]);
+    };
+    for (std::size_t i = 0; i < ray_lanes; ++i)
+      packet.rays[i].phase += steps.length[i] * (difference(0, i) + difference(1, i)) / 2;
   }
 }
 
@@ -228,17 +228,33 @@ LightRow PolarTracer::row(int y) const {
   return row;
 }
 
+void PolarView::Analyses::set(std::size_t band, const Analysis& analysis) {
+  through[band] = static_cast<float>(analysis.through);
+  for (std::size_t i = 0; i < 9; ++i)
+    by_rotation[i * through.size() + band] =
+        static_cast<float>(analysis.by_rotation(static_cast<int>(i / 3), static_cast<int>(i % 3)));
+}
+
+void PolarView::Analyses::powers(const LightRow& row, std::size_t x, float* powers) const {
+  const float* const rotations = row.of_pixel(x);
+  for (std::size_t k = 0; k < row.room; ++k) powers[k] = row.lit[x] * through[k];
+  for (std::size_t i = 0; i < 9 * row.room; i += row.room)
+    for (std::size_t k = 0; k < row.room; ++k) powers[k] += by_rotation[i + k] * rotations[i + k];
+}
+
 PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands,
-                     const std::vector<Vector3d>& colors)
-    : through_(turning_room(bands.size())), by_rotation_(9 * through_.size()), colors_(3 * through_.size()) {
-  const std::size_t room = through_.size();
-  for (std::size_t k = 0; k < bands.size(); ++k) {
-    const Analysis& analysis = analyses_.emplace_back(analysis_of(arrangement, bands[k].wavelength));
-    achromatic_ &= analysis.through == analyses_[0].through && analysis.by_rotation == analyses_[0].by_rotation;
-    through_[k] = static_cast<float>(analysis.through);
-    for (int i = 0; i < 9; ++i)
-      by_rotation_[static_cast<std::size_t>(i) * room + k] = static_cast<float>(analysis.by_rotation(i / 3, i % 3));
-    for (int c = 0; c < 3; ++c) colors_[static_cast<std::size_t>(c) * room + k] = static_cast<float>(colors[k][c]);
+                     const std::vector<Vector3d>& colors, bool stokes)
+    : bands_(bands.size()) {
+  const std::size_t room = turning_room(bands_);
+  shown_ = {std::vector<float>(room), std::vector<float>(9 * room)};
+  stokes_.assign(stokes ? 4 : 0, shown_);
+  colors_.resize(3 * room);
+  for (std::size_t k = 0; k < bands_; ++k) {
+    shown_.set(k, analysis_of(arrangement, bands[k].wavelength));
+    for (std::size_t s = 0; s < stokes_.size(); ++s) stokes_[s].set(k, stokes_of(arrangement, bands[k].wavelength)[s]);
+    for (std::size_t c = 0; c < 3; ++c) colors_[c * room + k] = static_cast<float>(colors[k][static_cast<int>(c)]);
+    achromatic_ &= shown_.through[k] == shown_.through[0];
+    for (std::size_t i = 0; i < 9; ++i) achromatic_ &= shown_.by_rotation[i * room + k] == shown_.by_rotation[i * room];
   }
 }
 
@@ -249,32 +265,26 @@ void PolarView::set_sums(LightRow& row) const {
 }
 
 Eigen::Vector3f PolarView::color(const LightRow& row, std::size_t x) const {
-  const std::size_t room = row.room;
   Eigen::Vector3f color;
   if (!achromatic_) {
-    std::vector<float> powers(room);
-    this->powers(row, x, powers.data());
-    sum_colors(powers.data(), 1, colors_.data(), room, color.data());
+    std::vector<float> powers(row.room);
+    shown_.powers(row, x, powers.data());
+    sum_colors(powers.data(), 1, colors_.data(), row.room, color.data());
     return color;
   }
-  sum_colors(through_.data(), 1, colors_.data(), room, color.data());
+  sum_colors(shown_.through.data(), 1, colors_.data(), row.room, color.data());
   color *= row.lit[x];
   for (std::size_t i = 0; i < 9; ++i)
-    color += by_rotation_[i * room] * Eigen::Map<const Eigen::Vector3f>(&row.sums[27 * x + 3 * i]);
+    color += shown_.by_rotation[i * row.room] * Eigen::Map<const Eigen::Vector3f>(&row.sums[27 * x + 3 * i]);
   return color;
 }
 
-void PolarView::powers(const LightRow& row, std::size_t x, float* powers) const {
-  const float* const rotations = row.of_pixel(x);
-  for (std::size_t k = 0; k < row.room; ++k) powers[k] = row.lit[x] * through_[k];
-  for (std::size_t i = 0; i < 9 * row.room; i += row.room)
-    for (std::size_t k = 0; k < row.room; ++k) powers[k] += by_rotation_[i + k] * rotations[i + k];
-}
-
-Eigen::Vector4d PolarView::stokes(const LightRow& row, std::size_t x, std::size_t band) const {
-  Eigen::Matrix3d R;
-  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = row.of_pixel(x)[static_cast<std::size_t>(i) * row.room + band];
-  return analyses_[band].stokes(R, row.lit[x]);
+void PolarView::spectrum(const LightRow& row, std::size_t x, float* spectrum) const {
+  std::vector<float> powers(row.room);
+  for (std::size_t s = 0; s < std::max<std::size_t>(stokes_.size(), 1); ++s) {
+    (stokes_.empty() ? shown_ : stokes_[s]).powers(row, x, powers.data());
+    std::copy_n(powers.begin(), bands_, spectrum + s * bands_);
+  }
 }
 
 }  // namespace tensorray

@@ -94,28 +94,33 @@ class PolarTracer {
   std::vector<std::vector<std::vector<float>>> strengths_;  // By power of three; by wavelength of a band; by band.
 };
 
-/// An arrangement's analyses of all bands, for many pixels.
+/// What an arrangement shows of many pixels.
 class PolarView {
  public:
-  /// @param colors  R, G and B of each band.
-  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, const std::vector<Eigen::Vector3d>& colors);
-
-  std::size_t bands() const { return analyses_.size(); }
+  /// @param colors  R, G and B of each band. @param stokes  Whether spectra are Stokes' parameters.
+  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, const std::vector<Eigen::Vector3d>& colors,
+            bool stokes);
 
   /// Whether the arrangement treats all bands alike, so that `sums` are enough for its colours.
   bool is_achromatic() const { return achromatic_; }
   void set_sums(LightRow& row) const;
   Eigen::Vector3f color(const LightRow& row, std::size_t x) const;
 
-  /// The power of each band (Analysis::power). @param powers  Has room.
-  void powers(const LightRow& row, std::size_t x, float* powers) const;
-
-  Eigen::Vector4d stokes(const LightRow& row, std::size_t x, std::size_t band) const;
+  /// The power of each band (Analysis::power); or S0 of all bands, then S1, S2 and S3.
+  void spectrum(const LightRow& row, std::size_t x, float* spectrum) const;
 
  private:
-  std::vector<Analysis> analyses_;
+  /// Planes: analyses of all bands.
+  struct Analyses {
+    std::vector<float> through, by_rotation;
+    void set(std::size_t band, const Analysis& analysis);
+    void powers(const LightRow& row, std::size_t x, float* powers) const;
+  };
+  std::size_t bands_;
   bool achromatic_ = true;
-  std::vector<float> through_, by_rotation_, colors_;  // Planes.
+  Analyses shown_;
+  std::vector<Analyses> stokes_;
+  std::vector<float> colors_;
 };
 
 }  // namespace tensorray
