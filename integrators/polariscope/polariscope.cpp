@@ -153,7 +153,8 @@ void PolarTracer::sample(Packet& packet) const {
     sampler.sample(steps);
     if (room_ > 0) add_steps(steps, greatest_, packet.turns);
     const auto difference = [&](int point, std::size_t i) {
-      return std::sqrt(steps.a[point][i] * steps.a[point][i] + steps.b[point][i] * steps.b[point][i]);
+      const double a = steps.a[point][i], b = steps.b[point][i];  // Squares may be beyond single precision.
+      return std::sqrt(a * a + b * b);
     };
     for (std::size_t i = 0; i < ray_lanes; ++i)
       packet.rays[i].phase += steps.length[i] * (difference(0, i) + difference(1, i)) / 2;
@@ -229,61 +230,51 @@ LightRow PolarTracer::row(int y) const {
 }
 
 void PolarView::Analyses::set(std::size_t band, const Analysis& analysis) {
-  through[band] = static_cast<float>(analysis.through);
-  for (std::size_t i = 0; i < 9; ++i)
-    by_rotation[i * through.size() + band] =
-        static_cast<float>(analysis.by_rotation(static_cast<int>(i / 3), static_cast<int>(i % 3)));
+  const auto row = static_cast<Eigen::Index>(band);
+  through[row] = static_cast<float>(analysis.through);
+  for (int i = 0; i < 9; ++i) by_rotation(row, i) = static_cast<float>(analysis.by_rotation(i / 3, i % 3));
 }
 
-void PolarView::Analyses::powers(const LightRow& row, std::size_t x, float* powers) const {
-  const float* const rotations = row.of_pixel(x);
-  for (std::size_t k = 0; k < row.room; ++k) powers[k] = row.lit[x] * through[k];
-  for (std::size_t i = 0; i < 9 * row.room; i += row.room)
-    for (std::size_t k = 0; k < row.room; ++k) powers[k] += by_rotation[i + k] * rotations[i + k];
+Eigen::VectorXf PolarView::Analyses::powers(const LightRow& row, std::size_t x) const {
+  return row.lit[x] * through + by_rotation.cwiseProduct(rotations_of(row, x)).rowwise().sum();
 }
 
 PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands,
                      const std::vector<Vector3d>& colors, bool stokes)
-    : bands_(bands.size()) {
-  const std::size_t room = turning_room(bands_);
-  shown_ = {std::vector<float>(room), std::vector<float>(9 * room)};
-  stokes_.assign(stokes ? 4 : 0, shown_);
-  colors_.resize(3 * room);
-  for (std::size_t k = 0; k < bands_; ++k) {
+    : bands_(static_cast<Eigen::Index>(bands.size())) {
+  const auto room = static_cast<Eigen::Index>(turning_room(bands.size()));
+  shown_ = {Eigen::VectorXf::Zero(room), BandRotations::Zero(room, 9)};
+  spectra_.assign(stokes ? 4 : 0, shown_);
+  colors_ = Eigen::Matrix3Xf::Zero(3, room);
+  for (std::size_t k = 0; k < bands.size(); ++k) {
     shown_.set(k, analysis_of(arrangement, bands[k].wavelength));
-    for (std::size_t s = 0; s < stokes_.size(); ++s) stokes_[s].set(k, stokes_of(arrangement, bands[k].wavelength)[s]);
-    for (std::size_t c = 0; c < 3; ++c) colors_[c * room + k] = static_cast<float>(colors[k][static_cast<int>(c)]);
-    achromatic_ &= shown_.through[k] == shown_.through[0];
-    for (std::size_t i = 0; i < 9; ++i) achromatic_ &= shown_.by_rotation[i * room + k] == shown_.by_rotation[i * room];
+    for (std::size_t s = 0; s < spectra_.size(); ++s)
+      spectra_[s].set(k, stokes_of(arrangement, bands[k].wavelength)[s]);
+    const auto column = static_cast<Eigen::Index>(k);
+    colors_.col(column) = colors[k].cast<float>();
+    achromatic_ &=
+        shown_.through[column] == shown_.through[0] && shown_.by_rotation.row(column) == shown_.by_rotation.row(0);
   }
+  if (!stokes) spectra_.push_back(shown_);
+  through_ = colors_ * shown_.through;
 }
 
 void PolarView::set_sums(LightRow& row) const {
   row.sums.resize(27 * row.lit.size());
   for (std::size_t x = 0; x < row.lit.size(); ++x)
-    sum_colors(row.of_pixel(x), 9, colors_.data(), row.room, &row.sums[27 * x]);
+    Eigen::Map<Eigen::Matrix<float, 3, 9>>(&row.sums[27 * x]).noalias() = colors_ * rotations_of(row, x);
 }
 
 Eigen::Vector3f PolarView::color(const LightRow& row, std::size_t x) const {
-  Eigen::Vector3f color;
-  if (!achromatic_) {
-    std::vector<float> powers(row.room);
-    shown_.powers(row, x, powers.data());
-    sum_colors(powers.data(), 1, colors_.data(), row.room, color.data());
-    return color;
-  }
-  sum_colors(shown_.through.data(), 1, colors_.data(), row.room, color.data());
-  color *= row.lit[x];
-  for (std::size_t i = 0; i < 9; ++i)
-    color += shown_.by_rotation[i * row.room] * Eigen::Map<const Eigen::Vector3f>(&row.sums[27 * x + 3 * i]);
-  return color;
+  if (!achromatic_) return colors_ * shown_.powers(row, x);
+  const Eigen::Map<const Eigen::Matrix<float, 3, 9>> sums(&row.sums[27 * x]);
+  return row.lit[x] * through_ + sums * shown_.by_rotation.row(0).transpose();
 }
 
 void PolarView::spectrum(const LightRow& row, std::size_t x, float* spectrum) const {
-  std::vector<float> powers(row.room);
-  for (std::size_t s = 0; s < std::max<std::size_t>(stokes_.size(), 1); ++s) {
-    (stokes_.empty() ? shown_ : stokes_[s]).powers(row, x, powers.data());
-    std::copy_n(powers.begin(), bands_, spectrum + s * bands_);
+  for (const Analyses& parameter : spectra_) {
+    Eigen::Map<Eigen::VectorXf>(spectrum, bands_) = parameter.powers(row, x).head(bands_);
+    spectrum += bands_;
   }
 }
 

@@ -53,10 +53,14 @@ struct LightRow {
   std::vector<float> rotations;  ///< Of a pixel, nine planes of `room` each: the mean rotation (elements.h) by bands.
   std::vector<float> lit;        ///< By pixels: the part of the light that nothing stops.
   std::vector<PolarPoint> points;
-  std::vector<float> sums;  ///< By pixels: of each of the nine planes, the sums of three colours (PolarView).
-
-  const float* of_pixel(std::size_t x) const { return &rotations[9 * room * x]; }
+  std::vector<float> sums;  ///< By pixels: of the nine planes, the sums of three colours each (PolarView).
 };
+
+/// A number of bands, and for each of them the nine components of a rotation, row by row.
+using BandRotations = Eigen::Matrix<float, Eigen::Dynamic, 9>;
+inline Eigen::Map<const BandRotations> rotations_of(const LightRow& row, std::size_t x) {
+  return {&row.rotations[9 * row.room * x], static_cast<Eigen::Index>(row.room), 9};
+}
 
 /// Traces parallel light to the pixels of a plate. Steps are at most the finest voxel long, of fourth order in the
 /// step, and exact where T is constant; the matrices are unitary whatever the step is. Where the phase between the two
@@ -110,17 +114,19 @@ class PolarView {
   void spectrum(const LightRow& row, std::size_t x, float* spectrum) const;
 
  private:
-  /// Planes: analyses of all bands.
+  /// By bands.
   struct Analyses {
-    std::vector<float> through, by_rotation;
+    Eigen::VectorXf through;
+    BandRotations by_rotation;
     void set(std::size_t band, const Analysis& analysis);
-    void powers(const LightRow& row, std::size_t x, float* powers) const;
+    Eigen::VectorXf powers(const LightRow& row, std::size_t x) const;
   };
-  std::size_t bands_;
+  Eigen::Index bands_;
   bool achromatic_ = true;
+  std::vector<Analyses> spectra_;  // Of each parameter.
   Analyses shown_;
-  std::vector<Analyses> stokes_;
-  std::vector<float> colors_;
+  Eigen::Matrix3Xf colors_;
+  Eigen::Vector3f through_;  // Colour of what passes, whatever R is.
 };
 
 }  // namespace tensorray

@@ -92,9 +92,10 @@ bool add_to(const RaySteps& steps, float greatest, RayTurns& open, RayTurns& nex
   const F most = set(0.75);  // Of the angle: 0.75⁹ / 9! is 2e-7.
   bool fits = true;
   for (int at = 0; at < ray_lanes; at += static_cast<int>(hn::Lanes(d))) {
-    const F h = load(steps.length + at), a1 = load(steps.a[0] + at), b1 = load(steps.b[0] + at);
-    const F a2 = load(steps.a[1] + at), b2 = load(steps.b[1] + at), half = set(0.5) * h;
-    const F alpha = half * (a1 + a2), beta = half * (b1 + b2), gamma = set(gauss_point) * h * h * (a2 * b1 - a1 * b2);
+    const F h = load(steps.length + at);  // Times a and b first: alone, its square may be beyond single precision.
+    const F a1 = h * load(steps.a[0] + at), b1 = h * load(steps.b[0] + at);
+    const F a2 = h * load(steps.a[1] + at), b2 = h * load(steps.b[1] + at);
+    const F alpha = set(0.5) * (a1 + a2), beta = set(0.5) * (b1 + b2), gamma = set(gauss_point) * (a2 * b1 - a1 * b2);
     const F z = set(greatest) * gamma, angle = set(greatest) * hn::Sqrt(alpha * alpha + beta * beta + z * z);
     F part = set(1), squares = set(0);
     for (int n = 0; n < 120 && !hn::AllFalse(d, hn::Gt(part * angle, most)); ++n) {
@@ -157,15 +158,6 @@ void add_all(const float* planes, float weight, std::size_t room, float* rotatio
   }
 }
 
-void sum_all(const float* planes, std::size_t count, const float* colors, std::size_t room, float* sums) {
-  for (std::size_t i = 0; i < 3 * count; ++i) {
-    F sum = set(0);
-    for (std::size_t at = 0; at < room; at += hn::Lanes(Floats()))
-      sum = sum + load(planes + i / 3 * room + at) * load(colors + i % 3 * room + at);
-    sums[i] = hn::GetLane(hn::SumOfLanes(Floats(), sum));
-  }
-}
-
 }  // namespace
 }  // namespace tensorray::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -176,7 +168,6 @@ namespace tensorray {
 HWY_EXPORT(add_to);
 HWY_EXPORT(take_turns);
 HWY_EXPORT(add_all);
-HWY_EXPORT(sum_all);
 
 void add_steps(const RaySteps& steps, double greatest, std::vector<RayTurns>& turns) {
   RayTurns next;
@@ -191,10 +182,6 @@ void turn(const std::vector<RayTurns>& turns, std::size_t ray, const float* stre
 
 void add_rotations(const float* planes, float weight, std::size_t room, float* rotations) {
   HWY_DYNAMIC_DISPATCH(add_all)(planes, weight, room, rotations);
-}
-
-void sum_colors(const float* planes, std::size_t count, const float* colors, std::size_t room, float* sums) {
-  HWY_DYNAMIC_DISPATCH(sum_all)(planes, count, colors, room, sums);
 }
 
 }  // namespace tensorray

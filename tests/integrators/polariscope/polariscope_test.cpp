@@ -66,7 +66,7 @@ LightRow row_of(const TensorField& field, const PolarizedLight& light, const Pla
 /// The mean rotation of a pixel in a band.
 Matrix3d rotation_of(const LightRow& row, std::size_t x = 0, std::size_t band = 0) {
   Matrix3d R;
-  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = row.of_pixel(x)[static_cast<std::size_t>(i) * row.room + band];
+  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = rotations_of(row, x)(static_cast<int>(band), i);
   return R;
 }
 
