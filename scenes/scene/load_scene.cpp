@@ -34,6 +34,7 @@ constexpr double narrowest_plate = 0.25;  // Its shorter side, as a part of the 
 constexpr double visible = 0.02;          // AutoScale::shown; a picture that shows less looks empty.
 constexpr double much_less = 0.5;         // Of the best AutoScale::shown: reason to name that scale.
 constexpr double erased = 0.5;            // Of a field's variation: less is left where smoothing erases structure.
+constexpr double huge = 1e4;              // The greatest exponent s · scale · T · way of a scale that is not.
 constexpr double much = 1;                // AutoScale::median_turn, radians.
 
 BlockSource open_field(const SceneDescription& scene) {
@@ -244,13 +245,29 @@ Surfaces load_surfaces(const SceneDescription& description, const TensorField& f
   return surfaces;
 }
 
-/// What to do about a given scale that shows hardly anything; empty: it shows enough, or no other one would.
-std::string advice_on(const AutoScale& given, const AutoScale& best) {
+/// What to do about a given scale that shows hardly anything, or is huge; empty: it shows enough, or no other one
+/// would.
+std::string advice_on(const AutoScale& given, const AutoScale& best, bool is_huge) {
   const bool is_tangled = given.median_turn > best.median_turn;
-  if (given.shown >= much_less * best.shown) return "";
+  if (best.shown == 0 || (given.shown >= much_less * best.shown && !is_huge)) return "";
   return fmt::format("warning: {}: `field.scale` {:.3g} shows {:.0f}% of the field, {:.3g} shows {:.2g}%",
-                     is_tangled ? "light is tangled" : "light turns too little to be seen", best.scale,
-                     100 * best.shown, given.scale, 100 * given.shown);
+                     is_huge      ? "the scale is huge, and light takes very many steps"
+                     : is_tangled ? "light is tangled"
+                                  : "light turns too little to be seen",
+                     best.scale, 100 * best.shown, given.scale, 100 * given.shown);
+}
+
+/// The scale that shows the field to its light; if its picture looks through the field in another direction, the mean
+/// of the scales for both.
+AutoScale scale_for(const SceneDescription& description, const TensorField& field, const Geometry& volume,
+                    const Beam& light, const Progress& progress) {
+  const AutoScale scale = choose_scale(field, volume, light, progress);
+  const auto view = description.integrator.method().view_through(description, field.world_box().center());
+  if (!view || view->norm() == 0) return scale;
+  const AutoScale by_view = choose_scale(field, volume, silhouette_beam(field.corners(), *view, light.up), progress);
+  if (by_view.shown == 0) return scale;
+  const double mean = scale.shown > 0 ? std::sqrt(scale.scale * by_view.scale) : by_view.scale;
+  return judge_scale(field, volume, light, mean, probe_flexibility, progress);
 }
 
 /// The scale of the scene; without one, a scale that bends light visibly. The choice ignores obstacles and aperture, so
@@ -262,16 +279,18 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
     return AutoScale{given.value_or(1)};
   const Geometry volume({geometry.surfaces().bounds, geometry.surfaces().cut, std::nullopt, {}});
   const Beam light = silhouette_beam(field.corners(), beam.direction, beam.up);
-  AutoScale scale = given ? judge_scale(field, volume, light, *given, flexibility, progress)
-                          : choose_scale(field, volume, light, progress);
-  const auto view = description.integrator.method().view_through(description, field.world_box().center());
-  if (!given && view && view->norm() > 0) {  // Both what light shows and what is seen: the mean of their scales.
-    const Beam seen = silhouette_beam(field.corners(), *view, beam.up);
-    const AutoScale by_view = choose_scale(field, volume, seen, progress);
-    const double mean = scale.shown > 0 ? std::sqrt(scale.scale * by_view.scale) : by_view.scale;
-    if (by_view.shown > 0) scale = judge_scale(field, volume, light, mean, probe_flexibility, progress);
+  const AutoScale scale = given ? judge_scale(field, volume, light, *given, flexibility, progress)
+                                : scale_for(description, field, volume, light, progress);
+  const double depth = (field.to_world().linear() * field.index_bounds().sizes()).norm();
+  const bool is_huge = std::abs(scale.scale * flexibility) * field.max_norm() * depth > huge;
+  std::string advice;
+  if (given && (scale.shown < visible || scale.median_turn > much || is_huge) &&
+      description.integrator.method().needs_light_direction(description)) {
+    AutoScale best = scale_for(description, field, volume, light, progress);
+    best.scale *= probe_flexibility / std::abs(flexibility);
+    advice = advice_on(scale, best, is_huge);
   }
-  if (scale.greatest_turn == 0) {
+  if (scale.greatest_turn == 0 && advice.empty()) {
     notes.push_back(
         fmt::format("warning: no probe ray is turned (the field is zero or isotropic, or light travels along its "
                     "eigenvectors, or misses the volume); scale {:g}",
@@ -283,13 +302,7 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
       "{:.0f}%)",
       scale.scale, scale.scale < 0 ? ", negative: light bends the other way," : "", given ? flexibility : 0.2,
       scale.median_turn, scale.greatest_turn, 100 * scale.shown));
-  if (given && (scale.shown < visible || scale.median_turn > much) &&
-      description.integrator.method().needs_light_direction(description)) {
-    AutoScale best = choose_scale(field, volume, light, progress);
-    best.scale *= probe_flexibility / std::abs(flexibility);
-    const std::string advice = advice_on(scale, best);
-    if (!advice.empty()) notes.push_back(advice);
-  }
+  if (!advice.empty()) notes.push_back(advice);
   return scale;
 }
 

@@ -93,7 +93,7 @@ void expect_only_within(Part part, const Image& with, const Image& without, cons
 
 TEST(Annotations, AreInTheirCornersAndNowhereElse) {
   for (const MethodCase& method : methods) {
-    const Rendered plain = rendered(method, nullptr);
+    const Rendered plain = rendered(method, Json::array());
     const std::vector<std::pair<std::string, Part>> parts{
         {"scale", method.scale}, {"axes", Part::upper_left}, {"legend", method.legend}};
     for (const auto& [annotation, part] : parts) {
@@ -110,6 +110,17 @@ TEST(Annotations, AreInTheirCornersAndNowhereElse) {
   }
 }
 
+/// Tubes have a legend and a scale bar if nothing is said, where they have a meaning, and no warning.
+TEST(Annotations, OfTubesAreThereByDefault) {
+  for (const MethodCase& method : methods) {
+    const Rendered plain = rendered(method, Json::array()), usual = rendered(method, nullptr);
+    const bool has_some = Json::parse(method.text)["integrator"]["type"] == "path_tracing";
+    EXPECT_EQ(usual.display.pixels != plain.display.pixels, has_some) << method.name;
+    EXPECT_EQ(usual.render.linear.pixels, plain.render.linear.pixels) << method.name;
+    EXPECT_EQ(usual.render.warnings.size(), plain.render.warnings.size()) << method.name;
+  }
+}
+
 /// The lines of a body, where there is one: an obstacle, at the bottom of the volume. In no other file.
 TEST(Annotations, ShowBodies) {
   const TemporaryFolder folder;
@@ -122,7 +133,7 @@ TEST(Annotations, ShowBodies) {
     Json json = Json::parse(method.text);
     json["obstacles"] = {{{"file", (folder / "box.ply").string()}}};
     with.text = json.dump();
-    const Rendered plain = rendered(with, nullptr), visible = rendered(with, "body");
+    const Rendered plain = rendered(with, Json::array()), visible = rendered(with, "body");
     EXPECT_EQ(visible.display.pixels != plain.display.pixels, has_lines) << method.name;
     EXPECT_EQ(visible.render.linear.pixels, plain.render.linear.pixels) << method.name;
     EXPECT_EQ(visible.render.warnings.size() - plain.render.warnings.size(), has_lines ? 0u : 1u) << method.name;

@@ -104,7 +104,6 @@ std::vector<std::string> common_changes(const ExploreOptions& options) {
   for (const char* key : {"light.up", "light.aperture", "receiver.center", "receiver.normal", "receiver.up",
                           "receiver.size", "receiver.resolution"})
     changes.push_back(std::string(key) + "=null");
-  changes.emplace_back("output.annotations=[]");  // Pictures are small.
   return changes;
 }
 
@@ -173,6 +172,7 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
       changes.insert(changes.end(),
                      {direction, scaled, pixels, fmt::format("camera.resolution=[{0},{0}]", options.size),
                       fmt::format("integrator.stretch.pixels={}", options.size)});
+      if (scene->description.output.default_annotations) changes.emplace_back("output.annotations=[]");  // No room.
       SceneDescription cell = with(options, changes);
       cell.judges_scale = false;
       load(cell);
