@@ -197,6 +197,8 @@ void DifferenceSampler::sample(RaySteps& steps) {
     TensorSampler sampler(field_);
     for (int point = 0; point < 2; ++point)
       for (int i = 0; i < ray_lanes; ++i) {
+        steps.a[point][i] = steps.b[point][i] = 0;
+        if (!(steps.length[i] > 0)) continue;
         const Eigen::Vector3d index(steps.origin[0][i], steps.origin[1][i], steps.origin[2][i]);
         const Eigen::Matrix3d T = sampler.at(field_.to_world() * (index + steps.place[point][i] * along_));
         steps.a[point][i] = static_cast<float>(to_a_.cwiseProduct(T).sum());

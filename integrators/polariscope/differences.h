@@ -20,8 +20,8 @@ class DifferenceSampler {
   DifferenceSampler(const TensorField& field, const Eigen::Vector3d& along, const Eigen::Vector3d& u,
                     const Eigen::Vector3d& w, double factor);
 
-  /// Sets a and b of the rays that have a step. Points outside the extent are moved to it. The result does not depend
-  /// on earlier calls.
+  /// Sets a and b of the rays that have a step, and those of others to 0. Points outside the extent are moved to it.
+  /// The result does not depend on earlier calls.
   void sample(RaySteps& steps);
 
   /// Of a cell of the finest voxels: the first of the 4³ coefficients that are in use there; null: they are 0. A

@@ -86,10 +86,12 @@ HWY_INLINE Series product(const Series& p, const Series& q) {
   return result;
 }
 
-/// Adds steps to `open`, or, if any turn would be too great, sets `next` to them. @return whether they are added.
+/// Adds steps to `open`, or, if any turn would be too great, sets `next` to them: together with what is open of the
+/// other rays, so that the result for a ray does not depend on its neighbours. @return whether they are added.
 bool add_to(const RaySteps& steps, float greatest, RayTurns& open, RayTurns& next) {
   const Floats d;
-  const F most = set(0.75);  // Of the angle: 0.75⁹ / 9! is 2e-7.
+  // Of the angle: 0.75⁹ / 9! is 2e-7. Where axes turn much within a step, more is cut, but far less than the step errs.
+  const F most = set(0.75);
   bool fits = true;
   for (int at = 0; at < ray_lanes; at += static_cast<int>(hn::Lanes(d))) {
     const F h = load(steps.length + at);  // Times a and b first: alone, its square may be beyond single precision.
@@ -108,9 +110,18 @@ bool add_to(const RaySteps& steps, float greatest, RayTurns& open, RayTurns& nex
     store(angle, next.angle + at);
     store(squares, next.squares + at);
   }
-  for (int at = 0; fits && at < ray_lanes; at += static_cast<int>(hn::Lanes(d))) {
-    store_series(product(load_series(next, at), load_series(open, at)), open, at);
-    store(load(open.angle + at) + load(next.angle + at), open.angle + at);
+  RayTurns& to = fits ? open : next;
+  for (int at = 0; at < ray_lanes; at += static_cast<int>(hn::Lanes(d))) {
+    const F before = load(open.angle + at), angle = load(next.angle + at);
+    const auto is_full = hn::Gt(before + angle, most);
+    Series so_far = load_series(open, at);
+    for (int m = 0; m < 4; ++m) {
+      so_far.u[m] = {hn::IfThenZeroElse(is_full, so_far.u[m].re), hn::IfThenZeroElse(is_full, so_far.u[m].im)};
+      so_far.v[m] = {hn::IfThenZeroElse(is_full, so_far.v[m].re), hn::IfThenZeroElse(is_full, so_far.v[m].im)};
+    }
+    store_series(product(load_series(next, at), so_far), to, at);
+    if (!fits) store(hn::IfThenElseZero(is_full, before), open.angle + at);
+    store(hn::IfThenElse(is_full, angle, before + angle), to.angle + at);
   }
   return fits;
 }
@@ -133,7 +144,9 @@ void take_turns(const RayTurns* turns, std::size_t count, std::size_t ray, const
       Complex u = G * sum_of(turn->series[0], ray, G), v = g * sum_of(turn->series[1], ray, G);
       for (float n = 0; n < turn->squares[ray]; ++n) {  // With w − 1 for w, which has few digits of small angles.
         const F twice = two * u.re + two;
-        u = {u.re * (twice + two), twice * u.im};
+        const F sine =
+            v.re * v.re + v.im * v.im + u.im * u.im;  // Squared: beyond a quarter turn, 1 + w has few digits.
+        u = {hn::IfThenElse(hn::Lt(u.re, set(-1)), set(-2) * sine, u.re * (twice + two)), twice * u.im};
         v = twice * v;
       }
       u.re = u.re + set(1);
