@@ -93,13 +93,6 @@ PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, con
 
 PolarTracer::~PolarTracer() = default;
 
-const std::vector<std::vector<float>>& PolarTracer::wavelengths_for(double phase) const {
-  std::size_t threes = 0;
-  double change = 2 * phase * widest_;
-  for (; change > 1 && threes < most_threes; change /= 3) ++threes;
-  return strengths_[threes];
-}
-
 void PolarTracer::find_steps(Ray& ray) const {
   const Vector3d& k = light_.direction;
   const Vector3d from_start = ray.origin - light_.start;
@@ -178,7 +171,9 @@ void PolarTracer::add(std::size_t lane, float weight, std::size_t x, Packet& pac
   ++packet.sums[x].inside;
   if (room_ == 0) return;
   packet.planes.resize(4 * room_);
-  const auto& wavelengths = wavelengths_for(ray.phase);
+  std::size_t threes = 0;
+  for (double change = 2 * ray.phase * widest_; change > 1 && threes < most_threes; change /= 3) ++threes;
+  const std::vector<std::vector<float>>& wavelengths = strengths_[threes];
   for (std::size_t i = 0; i < wavelengths.size(); ++i) {
     turn(packet.turns, lane, wavelengths[i].data(), room_, packet.planes.data());
     add_rotations(packet.planes.data(), weight / static_cast<float>(wavelengths.size()), room_, rotations);

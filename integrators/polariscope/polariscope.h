@@ -11,7 +11,6 @@
 
 #include <Eigen/Core>
 
-#include "base/process/archive.h"
 #include "integrators/polariscope/elements.h"
 #include "renderer/spectra/spectrum.h"
 #include "renderer/surfaces/plate.h"
@@ -83,7 +82,6 @@ class PolarTracer {
   void find_steps(Ray& ray) const;
   void sample(Packet& packet) const;
   void add(std::size_t lane, float weight, std::size_t x, Packet& packet, LightRow& row) const;
-  const std::vector<std::vector<float>>& wavelengths_for(double phase) const;
 
   const TensorField& field_;
   const Geometry& geometry_;

@@ -223,5 +223,18 @@ TEST_F(Polariscope, SignsOfStressesCount) {
   EXPECT_THAT(notes_, Contains(HasSubstr("/field/scale")));
 }
 
+/// Keys without an effect are named.
+TEST_F(Polariscope, SaysWhichKeysHaveNoEffect) {
+  const std::vector<std::pair<Settings, std::string>> cases{
+      {{R"(integrator.arrangement={"before":[{"polarizer":0}]})", "integrator.analyzer=10"}, "`/integrator/analyzer`"},
+      {{"integrator.type=lens", "output.stokes=true"}, "`/output/stokes`"},
+      {{"output.stokes=true"}, "`/output/stokes`"}};
+  for (const auto& [settings, key] : cases)
+    EXPECT_THAT(read_scene(in_folder("scene.json"), {settings, {}}).warnings,
+                Contains(HasSubstr(key + " has no effect")));
+  for (const std::string& warning : read_scene(in_folder("scene.json"), {{"integrator.analyzer=10"}, {}}).warnings)
+    EXPECT_EQ(warning.find("analyzer"), std::string::npos) << warning;
+}
+
 }  // namespace
 }  // namespace tensorray
