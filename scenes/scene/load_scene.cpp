@@ -248,10 +248,10 @@ Surfaces load_surfaces(const SceneDescription& description, const TensorField& f
 /// What to do about a given scale that shows hardly anything, or is huge; empty: it shows enough, or no other one
 /// would.
 std::string advice_on(const AutoScale& given, const AutoScale& best, bool is_huge) {
-  const bool is_tangled = given.median_turn > best.median_turn;
-  if (best.shown == 0 || (given.shown >= much_less * best.shown && !is_huge)) return "";
+  const bool is_seen = given.shown >= much_less * best.shown, is_tangled = given.median_turn > best.median_turn;
+  if (best.shown == 0 || (is_seen && !is_huge)) return "";
   return fmt::format("warning: {}: `field.scale` {:.3g} shows {:.0f}% of the field, {:.3g} shows {:.2g}%",
-                     is_huge      ? "the scale is huge, and light takes very many steps"
+                     is_seen      ? "the scale is huge, and light takes very many steps"
                      : is_tangled ? "light is tangled"
                                   : "light turns too little to be seen",
                      best.scale, 100 * best.shown, given.scale, 100 * given.shown);

@@ -102,6 +102,7 @@ ImportedField::ImportedField(const std::vector<std::filesystem::path>& files, co
   std::vector<std::string> arguments{"-o", path_.string(), "-q"};
   for (const auto& [option, value] : choices)
     if (!value.empty()) arguments.insert(arguments.end(), {option, value});
+  if (quiet) arguments.emplace_back("--silent");
   arguments.emplace_back("--");
   for (const std::filesystem::path& file : files) arguments.push_back(file.string());
   const ProgramEnd end = run_program(import_program(), arguments, UnnamedFile());

@@ -5,6 +5,7 @@
 /// Only volumes/points/vtk_files.h uses the last one. Its errors are one line, without the program's name.
 
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -57,7 +58,7 @@ struct ImportOptions {
   std::filesystem::path output, boundary;
   std::string name, units, steps = "last";
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
-  bool no_surface = false, half = false, quiet = false, tells_progress = false;
+  bool no_surface = false, half = false, quiet = false, silent = false, tells_progress = false;
 };
 
 /// What a name stands for; CLI11 has checked that there is such a name.
@@ -446,7 +447,11 @@ void add_import_options(CLI::App& program, Progress& progress) {
   program.add_flag("--half", options->half, "Store 16-bit floats: three significant digits, half the size");
   program.add_flag("-q,--quiet", options->quiet, "No progress bar");
   program.add_flag("--tell-progress", options->tells_progress)->group("");  // For the Python package.
-  program.callback([options, &progress] { import(*options, progress); });
+  program.add_flag("--silent", options->silent)->group("");                 // For commands that print nothing else.
+  program.callback([options, &progress] {
+    if (options->silent && !std::freopen("/dev/null", "w", stdout)) throw std::runtime_error("/dev/null is missing");
+    import(*options, progress);
+  });
 }
 
 int read_vtp(int argc, char** argv) {
