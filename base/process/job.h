@@ -62,8 +62,8 @@ class Job {
   /// Whether such a result is worth its bytes: a shard's serves others; a checkpoint holds what takes long for its
   /// size.
   bool is_worth(std::size_t bytes, double seconds) const {
-    constexpr double bytes_of_interval = 64e6;
-    return is_shard || static_cast<double>(bytes) * interval <= bytes_of_interval * seconds;
+    constexpr double bytes_per_second = 1e6;
+    return is_shard || static_cast<double>(bytes) <= bytes_per_second * seconds;
   }
 
   // Set from outside, before the work begins:

@@ -57,9 +57,10 @@ int split_at_edge(Wavefront& front, const PathState& path, bool enters) {
   std::vector<float>& part = front.memory.of_one_light;
   for (const IrradianceMap& map : front.scene.irradiance_maps) {
     const bool may_be_it = light.light == map.light || (light.light < 0 && !light.is_delta);
-    if (!may_be_it || map.surface != hit.surface || !is_lit(map, hit.position, path.vertex.direction)) continue;
+    if (!may_be_it || map.surface != hit.surface) continue;
     const std::optional<double> through = straight_at(map, hit.position);
     if (!through || std::abs(*through - (enters ? 1 : 0)) < rounding) continue;
+    if (!is_lit(map, hit.position, path.vertex.direction)) continue;
     if (light.light == map.light)
       part = light.radiance;
     else

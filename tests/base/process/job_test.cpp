@@ -203,15 +203,5 @@ TEST(ArchiveTest, PacksWhatResemblesItself) {
   }
 }
 
-/// A checkpoint holds no light that is made more quickly than it is worth; a shard does, for others.
-TEST(JobTest, LightIsWorthItsTime) {
-  Job job;
-  job.interval = 60;
-  EXPECT_FALSE(job.is_worth(200'000'000, 60));
-  EXPECT_TRUE(job.is_worth(200'000'000, 200));
-  job.is_shard = true;
-  EXPECT_TRUE(job.is_worth(200'000'000, 60));
-}
-
 }  // namespace
 }  // namespace tensorray

@@ -256,7 +256,7 @@ TEST_F(KeptWork, AFullDiskLeavesTheOldCheckpoint) {
   end_by(SIGKILL);
   const std::string kept = read_file(in_folder("a.png.checkpoint"));
   std::vector<std::string> arguments = render("a", {"--resume", "--checkpoint", "0.01"});
-  const Outcome outcome = run(arguments, 16);
+  const Outcome outcome = run(arguments, 4);
   EXPECT_EQ(outcome.status, 1) << outcome.error;  // There is no room for the picture, either.
   EXPECT_NE(outcome.error.find("warning: no checkpoint"), std::string::npos) << outcome.error;
   EXPECT_TRUE(read_file(in_folder("a.png.checkpoint")) == kept);

@@ -1,4 +1,4 @@
-// What artists bring: scenes in which y is up, pictures on meshes, light that ends smoothly, a view through haze.
+// What artists bring: scenes in which y is up, pictures on meshes, light that ends smoothly.
 
 #include <fmt/core.h>
 
@@ -133,18 +133,11 @@ TEST_F(FilmScene, MeshesHavePictures) {
     write_picture("normals.png", [n = normal](int, int) { return Vector3d(0.5 * (n + Vector3d::Ones())); });
     EXPECT_NEAR(mean(render({}), "G") / flat, expected, 1e-3) << normal.transpose();
   }
-}
 
-TEST_F(FilmScene, PicturesThatDoNotFitAreNamed) {
-  write_quad("\"texture\": \"colors.png\"");
-  write_picture("colors.png", [](int, int) { return Vector3d(0, 0, 1); });
   write("quad.obj", "v -1 -1 -2\nv 1 -1 -2\nv 1 1 -2\nf 1 2 3\n");
   expect_error(1, "quad.obj: has no texture coordinates", {});
   expect_error(2, "`/objects/0/texture`: patterns are for plates", {"objects.0.texture=checkerboard"});
-  expect_error(2, "only a mesh .* has `roughness_texture`",
-               {R"(objects=[{"paths":{},"roughness_texture":"colors.png"}])"});
-  expect_error(2, "has no roughness",
-               {"objects.0.roughness_texture=colors.png", R"(objects.0.material={"kind":"diffuse"})"});
+  expect_error(2, "\"diffuse\" has no roughness", {"objects.0.roughness_texture=half.png"});
 }
 
 /// Where a field is too weak to be seen, so is the edge of the light that comes through it.
@@ -159,21 +152,6 @@ TEST_F(FilmScene, TheLightsEdgeHasNoSeam) {
   const Image with = render(weak);
   EXPECT_GT(mean(with, "caustic.G"), 0.01);
   expect_near(with, without, 2e-3);
-}
-
-/// The automatic scale is that of the light alone for a plate, and between it and that of the view for a scene.
-TEST_F(FilmScene, TheScaleShowsWhatIsSeenThroughTheField) {
-  write("scene.json", R"({"field": {"generate": {"kind": "point_load", "resolution": 17}},
-    "receiver": {"resolution": [8, 8]}, "integrator": {"type": "scene", "max_samples": 1, "min_samples": 1},
-    "camera": {"direction": [0, 1, 0], "resolution": [8, 8]}})");
-  const auto scale = [&](const Settings& changes) {
-    render_all(changes);
-    return statistics_["field"]["scale"].get<double>();
-  };
-  const double light = scale({"integrator.type=photon_distribution"});
-  const double view = scale({"integrator.type=photon_distribution", "light.direction=[0,1,0]"});
-  EXPECT_NE(light, view);
-  EXPECT_NEAR(scale({}), std::sqrt(light * view), 1e-6 * light);
 }
 
 }  // namespace

@@ -293,7 +293,8 @@ TEST_F(WholeScene, PlatesAlongTheLightAreLitOnBothSides) {
           "integrator.min_samples=8",
           "integrator.max_depth=1",
           fmt::format("camera.position=[0,{},{}]", 4 * side, z),
-          fmt::format("camera.target=[0,0.35,{}]", z)};
+          fmt::format("camera.target=[0,0.35,{}]", z),
+          "field.scale=4.7"};
       automatic.push_back(mean(render(sets), "R"));
       sets.push_back("lights.0.caustic=map");
       map.push_back(mean(render(sets), "R"));
