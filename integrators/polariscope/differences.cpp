@@ -63,27 +63,25 @@ HWY_INLINE void locate(const CellBox& box, const double (&origin)[3][ray_lanes],
 
 /// The weights of the cubic B-spline along an axis.
 HWY_INLINE void weights_of(F t, F (&weights)[4]) {
-  const Floats d;
-  const F sixth = hn::Set(d, 1.0f / 6), two_thirds = hn::Set(d, 2.0f / 3), half = hn::Set(d, 0.5f);
-  const F u = hn::Sub(hn::Set(d, 1), t), tt = hn::Mul(t, t), uu = hn::Mul(u, u), two = hn::Set(d, 2);
-  weights[0] = hn::Mul(hn::Mul(uu, u), sixth);
-  weights[1] = hn::NegMulAdd(hn::Mul(half, tt), hn::Sub(two, t), two_thirds);
-  weights[2] = hn::NegMulAdd(hn::Mul(half, uu), hn::Sub(two, u), two_thirds);
-  weights[3] = hn::Mul(hn::Mul(tt, t), sixth);
+  const auto set = [](float value) HWY_ATTR { return hn::Set(Floats(), value); };
+  const F sixth = set(1.0f / 6), half = set(0.5f), u = set(1) - t;
+  weights[0] = u * u * u * sixth;
+  weights[1] = set(2.0f / 3) - half * t * t * (set(2) - t);
+  weights[2] = set(2.0f / 3) - half * u * u * (set(2) - u);
+  weights[3] = t * t * t * sixth;
 }
 
 /// a and b of points in one cell.
 HWY_INLINE void sum_cell(const float* first, const F (&weights)[3][4], F& a, F& b) {
   const Floats d;
-  constexpr int row = 2 * CubicBrick::width;  // Floats between neighbours along y.
   a = b = hn::Zero(d);
 #pragma GCC unroll 4
   for (int i = 0; i < 4; ++i) {
     F sheet_a = hn::Zero(d), sheet_b = sheet_a;
 #pragma GCC unroll 4
     for (int j = 0; j < 4; ++j) {
-      const float* const at = first + (i * CubicBrick::width + j) * row;
-      F line_a = hn::Mul(weights[2][0], hn::Set(d, at[0])), line_b = hn::Mul(weights[2][0], hn::Set(d, at[1]));
+      const float* const at = first + 2 * CubicBrick::width * (i * CubicBrick::width + j);
+      F line_a = weights[2][0] * hn::Set(d, at[0]), line_b = weights[2][0] * hn::Set(d, at[1]);
 #pragma GCC unroll 3
       for (int k = 1; k < 4; ++k) {
         line_a = hn::MulAdd(weights[2][k], hn::Set(d, at[2 * k]), line_a);

@@ -30,6 +30,14 @@ Matrix4d mueller_matrix(const std::vector<Element>& elements, double wavelength)
 
 bool is_polarizer(const Element& element) { return element.kind == ElementKind::polarizer; }
 
+/// What elements behind the specimen show, by a row of their matrix.
+Analysis analysis(const Arrangement& arrangement, double wavelength, const Eigen::RowVector4d& row) {
+  const bool is_polarized = last_polarizer(arrangement.before) || last_polarizer(arrangement.after);
+  const double greatest = is_polarized ? 0.5 : 1;  // Of parallel polarisers.
+  const Eigen::Vector4d in = mueller_matrix(arrangement.before, wavelength).col(0) / greatest;
+  return {in[0] * row[0], row.tail<3>().transpose() * in.tail<3>().transpose()};
+}
+
 }  // namespace
 
 const Element* first_polarizer(const std::vector<Element>& elements) {
@@ -50,20 +58,15 @@ Arrangement turned(Arrangement arrangement, double angle, double analyzer) {
 }
 
 Analysis analysis_of(const Arrangement& arrangement, double wavelength) {
-  const Matrix4d before = mueller_matrix(arrangement.before, wavelength);
-  const Matrix4d after = mueller_matrix(arrangement.after, wavelength);
+  return analysis(arrangement, wavelength, mueller_matrix(arrangement.after, wavelength).row(0));
+}
+
+std::array<Analysis, 4> stokes_of(const Arrangement& arrangement, double wavelength) {
   std::vector<Element> kept = arrangement.after;
-  const Element* const last = last_polarizer(kept);
-  const double greatest = last || last_polarizer(arrangement.before) ? 0.5 : 1;  // Of parallel polarisers.
-  if (last) kept.erase(kept.begin() + (last - kept.data()));
-  Analysis analysis;
-  analysis.through = before(0, 0) * after(0, 0) / greatest;
-  analysis.source = before(0, 0);
-  analysis.polarized = before.block<3, 1>(1, 0);
-  analysis.by_rotation = after.block<1, 3>(0, 1).transpose() * analysis.polarized.transpose() / greatest;
-  analysis.to_stokes = mueller_matrix(kept, wavelength) / greatest;
-  analysis.to_stokes.row(3) *= -1;
-  return analysis;
+  if (const Element* const last = last_polarizer(kept)) kept.erase(kept.begin() + (last - kept.data()));
+  const Matrix4d after = mueller_matrix(kept, wavelength);
+  const auto parameter = [&](int i) { return analysis(arrangement, wavelength, (i == 3 ? -1 : 1) * after.row(i)); };
+  return {parameter(0), parameter(1), parameter(2), parameter(3)};
 }
 
 EquivalentRetarder equivalent_retarder(const Eigen::Quaterniond& unitary) {

@@ -3,7 +3,7 @@
 /// The elements of a polariscope before and after the specimen, and the power that they let through.
 /// Polarisation is in the frame (u, w) across the light, in which the picture is seen: u to the right, w up.
 
-#include <optional>
+#include <array>
 #include <vector>
 
 #include <Eigen/Core>
@@ -35,30 +35,22 @@ Arrangement turned(Arrangement arrangement, double angle, double analyzer);
 /// (w, x, y, z); products of matrices are products of quaternions, and its rotation turns the vector (S1, S2, −S3) of
 /// Stokes' parameters. S3 > 0 is light that turns clockwise for who faces it.
 ///
-/// What an arrangement shows of light of one wavelength, of which R is the mean rotation. Light without polarisation
-/// comes in.
+/// What is seen of light of one wavelength, of which R is the mean rotation. Light without polarisation comes in.
 struct Analysis {
-  double through = 0;                                     ///< What passes, whatever R is, ...
-  Eigen::Matrix3d by_rotation = Eigen::Matrix3d::Zero();  ///< ... and for each component of R.
-  double source = 0;                                      ///< The same of the light on the last polariser: S0, and ...
-  Eigen::Vector3d polarized = Eigen::Vector3d::Zero();    ///< ... its polarised part before the specimen.
-  Eigen::Matrix4d to_stokes = Eigen::Matrix4d::Identity();  ///< From (source, R polarized) to (S0, S1, S2, S3).
+  double through;               ///< What passes, whatever R is, ...
+  Eigen::Matrix3d by_rotation;  ///< ... and for each component of R.
 
   /// Power; 1 is what parallel polarisers let through without a specimen. @param lit  The part of the light that is not
   /// stopped; R has been multiplied by it.
   double power(const Eigen::Matrix3d& R, double lit = 1) const {
     return lit * through + by_rotation.cwiseProduct(R).sum();
   }
-
-  /// Stokes' parameters without the last polariser, behind which their power would be `power`.
-  Eigen::Vector4d stokes(const Eigen::Matrix3d& R, double lit = 1) const {
-    Eigen::Vector4d in;
-    in << lit * source, R * polarized;
-    return to_stokes * in;
-  }
 };
 
 Analysis analysis_of(const Arrangement& arrangement, double wavelength);
+
+/// The same for Stokes' parameters S0 to S3 of the light on the last polariser.
+std::array<Analysis, 4> stokes_of(const Arrangement& arrangement, double wavelength);
 
 /// A unitary matrix as a rotation, then a linear retarder.
 struct EquivalentRetarder {

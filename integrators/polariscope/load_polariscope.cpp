@@ -144,7 +144,6 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
   } else if (const auto* number = std::get_if<double>(&settings.stress_optic)) {
     loaded.stress_optic = *number;
   } else {
-    loaded.is_automatic = true;
     loaded.stress_optic = choose_coefficient(scene, light, settings.unit_length, wavelength, notes);
   }
   if (!std::isfinite(static_cast<float>(loaded.stress_optic * settings.unit_length * scene.field.max_norm())))

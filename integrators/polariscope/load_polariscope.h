@@ -19,7 +19,6 @@ struct LoadedLightOfPolariscope {
   double stress_optic = 0;  ///< C at the reference wavelength.
   double wavelength = 0;    ///< The reference wavelength, nm.
   Arrangement arrangement;  ///< Turned.
-  bool is_automatic = false;
 };
 
 /// @param notes  Says what "auto" chose. @throw std::runtime_error naming the file of coefficients and the fix.

@@ -152,11 +152,12 @@ void PolarTracer::sample(Packet& packet) const {
     }
     sampler.sample(steps);
     if (room_ > 0) add_steps(steps, greatest_, packet.turns);
-    for (const int point : {0, 1})
-      for (std::size_t i = 0; i < ray_lanes; ++i) {
-        const float a = steps.a[point][i], b = steps.b[point][i];
-        packet.rays[i].phase += steps.length[i] * std::sqrt(a * a + b * b) / 2;
-      }
+    const auto difference = [&](int point, std::size_t i) {
+      const double a = steps.a[point][i], b = steps.b[point][i];  // Squares may be beyond single precision.
+      return std::sqrt(a * a + b * b);
+    };
+    for (std::size_t i = 0; i < ray_lanes; ++i)
+      packet.rays[i].phase += steps.length[i] * (difference(0, i) + difference(1, i)) / 2;
   }
 }
 
@@ -228,53 +229,53 @@ LightRow PolarTracer::row(int y) const {
   return row;
 }
 
+void PolarView::Analyses::set(std::size_t band, const Analysis& analysis) {
+  const auto row = static_cast<Eigen::Index>(band);
+  through[row] = static_cast<float>(analysis.through);
+  for (int i = 0; i < 9; ++i) by_rotation(row, i) = static_cast<float>(analysis.by_rotation(i / 3, i % 3));
+}
+
+Eigen::VectorXf PolarView::Analyses::powers(const LightRow& row, std::size_t x) const {
+  return row.lit[x] * through + by_rotation.cwiseProduct(rotations_of(row, x)).rowwise().sum();
+}
+
 PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands,
-                     const std::vector<Vector3d>& colors)
-    : through_(turning_room(bands.size())), by_rotation_(9 * through_.size()), colors_(3 * through_.size()) {
-  const std::size_t room = through_.size();
+                     const std::vector<Vector3d>& colors, bool stokes)
+    : bands_(static_cast<Eigen::Index>(bands.size())) {
+  const auto room = static_cast<Eigen::Index>(turning_room(bands.size()));
+  shown_ = {Eigen::VectorXf::Zero(room), BandRotations::Zero(room, 9)};
+  spectra_.assign(stokes ? 4 : 0, shown_);
+  colors_ = Eigen::Matrix3Xf::Zero(3, room);
   for (std::size_t k = 0; k < bands.size(); ++k) {
-    const Analysis& analysis = analyses_.emplace_back(analysis_of(arrangement, bands[k].wavelength));
-    achromatic_ &= analysis.through == analyses_[0].through && analysis.by_rotation == analyses_[0].by_rotation;
-    through_[k] = static_cast<float>(analysis.through);
-    for (int i = 0; i < 9; ++i)
-      by_rotation_[static_cast<std::size_t>(i) * room + k] = static_cast<float>(analysis.by_rotation(i / 3, i % 3));
-    for (int c = 0; c < 3; ++c) colors_[static_cast<std::size_t>(c) * room + k] = static_cast<float>(colors[k][c]);
+    shown_.set(k, analysis_of(arrangement, bands[k].wavelength));
+    for (std::size_t s = 0; s < spectra_.size(); ++s)
+      spectra_[s].set(k, stokes_of(arrangement, bands[k].wavelength)[s]);
+    const auto column = static_cast<Eigen::Index>(k);
+    colors_.col(column) = colors[k].cast<float>();
+    achromatic_ &=
+        shown_.through[column] == shown_.through[0] && shown_.by_rotation.row(column) == shown_.by_rotation.row(0);
   }
+  if (!stokes) spectra_.push_back(shown_);
+  through_ = colors_ * shown_.through;
 }
 
 void PolarView::set_sums(LightRow& row) const {
   row.sums.resize(27 * row.lit.size());
   for (std::size_t x = 0; x < row.lit.size(); ++x)
-    sum_colors(row.of_pixel(x), 9, colors_.data(), row.room, &row.sums[27 * x]);
+    Eigen::Map<Eigen::Matrix<float, 3, 9>>(&row.sums[27 * x]).noalias() = colors_ * rotations_of(row, x);
 }
 
 Eigen::Vector3f PolarView::color(const LightRow& row, std::size_t x) const {
-  const std::size_t room = row.room;
-  Eigen::Vector3f color;
-  if (!achromatic_) {
-    std::vector<float> powers(room);
-    this->powers(row, x, powers.data());
-    sum_colors(powers.data(), 1, colors_.data(), room, color.data());
-    return color;
+  if (!achromatic_) return colors_ * shown_.powers(row, x);
+  const Eigen::Map<const Eigen::Matrix<float, 3, 9>> sums(&row.sums[27 * x]);
+  return row.lit[x] * through_ + sums * shown_.by_rotation.row(0).transpose();
+}
+
+void PolarView::spectrum(const LightRow& row, std::size_t x, float* spectrum) const {
+  for (const Analyses& parameter : spectra_) {
+    Eigen::Map<Eigen::VectorXf>(spectrum, bands_) = parameter.powers(row, x).head(bands_);
+    spectrum += bands_;
   }
-  sum_colors(through_.data(), 1, colors_.data(), room, color.data());
-  color *= row.lit[x];
-  for (std::size_t i = 0; i < 9; ++i)
-    color += by_rotation_[i * room] * Eigen::Map<const Eigen::Vector3f>(&row.sums[27 * x + 3 * i]);
-  return color;
-}
-
-void PolarView::powers(const LightRow& row, std::size_t x, float* powers) const {
-  const float* const rotations = row.of_pixel(x);
-  for (std::size_t k = 0; k < row.room; ++k) powers[k] = row.lit[x] * through_[k];
-  for (std::size_t i = 0; i < 9 * row.room; i += row.room)
-    for (std::size_t k = 0; k < row.room; ++k) powers[k] += by_rotation_[i + k] * rotations[i + k];
-}
-
-Eigen::Vector4d PolarView::stokes(const LightRow& row, std::size_t x, std::size_t band) const {
-  Eigen::Matrix3d R;
-  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = row.of_pixel(x)[static_cast<std::size_t>(i) * row.room + band];
-  return analyses_[band].stokes(R, row.lit[x]);
 }
 
 }  // namespace tensorray

@@ -53,10 +53,14 @@ struct LightRow {
   std::vector<float> rotations;  ///< Of a pixel, nine planes of `room` each: the mean rotation (elements.h) by bands.
   std::vector<float> lit;        ///< By pixels: the part of the light that nothing stops.
   std::vector<PolarPoint> points;
-  std::vector<float> sums;  ///< By pixels: of each of the nine planes, the sums of three colours (PolarView).
-
-  const float* of_pixel(std::size_t x) const { return &rotations[9 * room * x]; }
+  std::vector<float> sums;  ///< By pixels: of the nine planes, the sums of three colours each (PolarView).
 };
+
+/// A number of bands, and for each of them the nine components of a rotation, row by row.
+using BandRotations = Eigen::Matrix<float, Eigen::Dynamic, 9>;
+inline Eigen::Map<const BandRotations> rotations_of(const LightRow& row, std::size_t x) {
+  return {&row.rotations[9 * row.room * x], static_cast<Eigen::Index>(row.room), 9};
+}
 
 /// Traces parallel light to the pixels of a plate. Steps are at most the finest voxel long, of fourth order in the
 /// step, and exact where T is constant; the matrices are unitary whatever the step is. Where the phase between the two
@@ -94,28 +98,35 @@ class PolarTracer {
   std::vector<std::vector<std::vector<float>>> strengths_;  // By power of three; by wavelength of a band; by band.
 };
 
-/// An arrangement's analyses of all bands, for many pixels.
+/// What an arrangement shows of many pixels.
 class PolarView {
  public:
-  /// @param colors  R, G and B of each band.
-  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, const std::vector<Eigen::Vector3d>& colors);
-
-  std::size_t bands() const { return analyses_.size(); }
+  /// @param colors  R, G and B of each band. @param stokes  Whether spectra are Stokes' parameters.
+  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, const std::vector<Eigen::Vector3d>& colors,
+            bool stokes);
 
   /// Whether the arrangement treats all bands alike, so that `sums` are enough for its colours.
   bool is_achromatic() const { return achromatic_; }
   void set_sums(LightRow& row) const;
   Eigen::Vector3f color(const LightRow& row, std::size_t x) const;
 
-  /// The power of each band (Analysis::power). @param powers  Has room.
-  void powers(const LightRow& row, std::size_t x, float* powers) const;
-
-  Eigen::Vector4d stokes(const LightRow& row, std::size_t x, std::size_t band) const;
+  /// The power of each band (Analysis::power); or S0 of all bands, then S1, S2 and S3.
+  void spectrum(const LightRow& row, std::size_t x, float* spectrum) const;
 
  private:
-  std::vector<Analysis> analyses_;
+  /// By bands.
+  struct Analyses {
+    Eigen::VectorXf through;
+    BandRotations by_rotation;
+    void set(std::size_t band, const Analysis& analysis);
+    Eigen::VectorXf powers(const LightRow& row, std::size_t x) const;
+  };
+  Eigen::Index bands_;
   bool achromatic_ = true;
-  std::vector<float> through_, by_rotation_, colors_;  // Planes.
+  std::vector<Analyses> spectra_;  // Of each parameter.
+  Analyses shown_;
+  Eigen::Matrix3Xf colors_;
+  Eigen::Vector3f through_;  // Colour of what passes, whatever R is.
 };
 
 }  // namespace tensorray

@@ -8,28 +8,21 @@ namespace {
 const char* const element_forms =
     R"({"polarizer": DEGREES}, {"quarter_wave": DEGREES} or {"retarder": NM, "axis": DEGREES})";
 
-/// Reads {"NAME": NUMBER}, and {"NAME": NUMBER, "axis": NUMBER} of a retarder.
-bool read_element(const Json& json, Element& element) {
-  const auto number = [&](const char* key, double& target) {
-    return json.contains(key) && json[key].is_number() && (target = json[key].get<double>(), true);
-  };
-  if (!json.is_object()) return false;
-  if (json.size() == 1 && number("polarizer", element.angle))
-    element.kind = ElementKind::polarizer;
-  else if (json.size() == 1 && number("quarter_wave", element.angle))
-    element.kind = ElementKind::quarter_wave;
-  else if (json.size() == 2 && number("retarder", element.retardation) && number("axis", element.angle))
-    element.kind = ElementKind::retarder;
-  else
-    return false;
-  return true;
-}
+const char* const element_names[] = {"polarizer", "quarter_wave", "retarder"};  // In the order of ElementKind.
 
+/// Reads a list of {"NAME": DEGREES}, and {"retarder": NM, "axis": DEGREES}.
 bool read_elements(const Json& json, std::vector<Element>& elements) {
-  if (!json.is_array()) return false;
-  for (const Json& item : json)
-    if (!read_element(item, elements.emplace_back())) return false;
-  return true;
+  for (const Json& item : json) {
+    const auto* const name = std::find_if(std::begin(element_names), std::end(element_names),
+                                          [&](const char* each) { return item.is_object() && item.contains(each); });
+    if (name == std::end(element_names)) return false;
+    const auto kind = static_cast<ElementKind>(name - element_names);
+    const bool has_axis = kind == ElementKind::retarder;
+    const Json value = item[*name], angle = has_axis ? item.value("axis", Json()) : value;
+    if (item.size() != (has_axis ? 2 : 1) || !value.is_number() || !angle.is_number()) return false;
+    elements.push_back({kind, angle, has_axis ? value.get<double>() : 0});
+  }
+  return json.is_array();
 }
 
 Json element_schema() {

@@ -55,21 +55,10 @@ struct PolarPicture {
 /// Turns traced light into the pixels of a row. @param nanometres  Of a phase of 1.
 void draw_row(const PolarView& view, double nanometres, const LightRow& row, std::size_t y, PolarPicture& picture) {
   static const ChannelTable<PolarPixel> table = polariscope_channels();
-  std::vector<float> powers(row.room);
   for (std::size_t x = 0; x < row.points.size(); ++x) {
     write_channels(table, {view.color(row, x), row.points[x], nanometres},
                    picture.image.pixel(static_cast<int>(x), static_cast<int>(y)));
-    if (picture.spectra == 0) continue;
-    float* const to = &picture.spectrum[(y * row.points.size() + x) * picture.spectra];
-    if (picture.spectra == view.bands()) {
-      view.powers(row, x, powers.data());
-      std::copy_n(powers.begin(), view.bands(), to);
-      continue;
-    }
-    for (std::size_t k = 0; k < view.bands(); ++k) {
-      const Eigen::Vector4d stokes = view.stokes(row, x, k);
-      for (std::size_t s = 0; s < 4; ++s) to[s * view.bands() + k] = static_cast<float>(stokes[static_cast<int>(s)]);
-    }
+    if (picture.spectra > 0) view.spectrum(row, x, &picture.spectrum[(y * row.points.size() + x) * picture.spectra]);
   }
 }
 
@@ -190,7 +179,7 @@ Render LoadedPolariscope::render(const Scene& scene, const Progress& progress, R
   const auto start = Clock::now();
   const Plate& plate = *scene.geometry.surfaces().plate;
   const PolarTracer tracer(scene.field, scene.geometry, loaded_.light, plate);
-  const PolarView view(loaded_.arrangement, loaded_.light.bands, band_colors(scene));
+  const PolarView view(loaded_.arrangement, loaded_.light.bands, band_colors(scene), scene.description.output.stokes);
   const double nanometres = loaded_.wavelength / (2 * pi);
   const auto width = static_cast<std::size_t>(plate.resolution.x()),
              height = static_cast<std::size_t>(plate.resolution.y());

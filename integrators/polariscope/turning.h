@@ -45,7 +45,4 @@ void turn(const std::vector<RayTurns>& turns, std::size_t ray, const float* stre
 /// Adds the rotations of quaternions, times `weight`: nine planes, row by row.
 void add_rotations(const float* planes, float weight, std::size_t room, float* rotations);
 
-/// The sums over wavelengths of `count` planes times three colours, planes too: sums[3 i + c].
-void sum_colors(const float* planes, std::size_t count, const float* colors, std::size_t room, float* sums);
-
 }  // namespace tensorray

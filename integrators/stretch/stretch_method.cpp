@@ -18,7 +18,7 @@ namespace tensorray {
 namespace {
 
 constexpr double default_wavelength = 550;  // nm
-constexpr Colormap map = Colormap::viridis;
+constexpr Colormap map = Colormap::cool_warm;
 
 /// The geometry of the scene without the plate, on which rays would end.
 Geometry without_plate(const Scene& scene) {
@@ -80,7 +80,9 @@ ChannelTable<StretchPixel> stretch_channels() {
 
 /// Makes the pictures from the values at the pixels of the entry plane, which is seen along the light as the plate is.
 void draw(const Scene& scene, const std::vector<float>& values, const Eigen::Vector2i& resolution, Render& render) {
-  const ValueRange range = choose_range({values.begin(), values.end()});
+  ValueRange range = choose_range({values.begin(), values.end()});
+  range.high = std::max(std::abs(range.low), std::abs(range.high));  // 0 has the middle of the colours.
+  range.low = -range.high;
   const Eigen::Matrix3d to_working = scene.color.xyz_to_working() * rec709_to_xyz();
   const ChannelTable<StretchPixel> table = stretch_channels();
   Image linear(resolution.x(), resolution.y(), channel_names(table));
@@ -92,7 +94,7 @@ void draw(const Scene& scene, const std::vector<float>& values, const Eigen::Vec
                    &linear.pixels[i * linear.channels.size()]);
     Eigen::Map<Eigen::Vector4f>(&display.pixels[4 * i]) = colormap_srgb(map, position).cast<float>().homogeneous();
   }
-  draw_color_bar(display, {"stretch", range, [](double position) { return colormap_srgb(map, position); }});
+  draw_color_bar(display, {"1/length", range, [](double position) { return colormap_srgb(map, position); }});
   render.linear = std::move(linear);
   render.display = std::move(display);
 }

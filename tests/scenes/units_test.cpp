@@ -71,8 +71,9 @@ Image picture_of(const SceneCase& one, double unit) {
   if (!json.contains("camera")) json["camera"]["resolution"] = {24, 24};
   TensorGrid grid = generate(Helix(), GridSettings{{17, 17, 17}});
   grid.to_world = Eigen::Affine3d(Eigen::Scaling(unit)) * grid.to_world;
-  const Scene scene = load_scene(read_scene_json(json, "scene.json"), Progress(),
-                                 prepare_field(source_of(std::move(grid)), {0, Eigenvalues::automatic, {}}, "helix"));
+  const Scene scene =
+      load_scene(read_scene_json(json, "scene.json"), Progress(),
+                 prepare_field(source_of(std::move(grid)), {0, false, Eigenvalues::automatic, {}}, "helix"));
   return render(scene, Progress()).linear;
 }
 

@@ -66,7 +66,7 @@ LightRow row_of(const TensorField& field, const PolarizedLight& light, const Pla
 /// The mean rotation of a pixel in a band.
 Matrix3d rotation_of(const LightRow& row, std::size_t x = 0, std::size_t band = 0) {
   Matrix3d R;
-  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = row.of_pixel(x)[static_cast<std::size_t>(i) * row.room + band];
+  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = rotations_of(row, x)(static_cast<int>(band), i);
   return R;
 }
 
@@ -82,6 +82,11 @@ Matrix3d plane_stress(double difference, double angle) {
   T(1, 1) = -T(0, 0);
   T(0, 1) = T(1, 0) = difference / 2 * std::sin(2 * angle);
   return T;
+}
+
+Eigen::Vector4d stokes(const Arrangement& arrangement, const Matrix3d& R) {
+  const std::array<Analysis, 4> parameters = stokes_of(arrangement, 550);
+  return {parameters[0].power(R), parameters[1].power(R), parameters[2].power(R), parameters[3].power(R)};
 }
 
 /// The table of arrangements: what a plate with a phase δ and axes at θ shows.
@@ -101,7 +106,7 @@ TEST(Polariscope, ArrangementsShowAPlateAsTheirFormulasSay) {
         const Matrix3d R = retarder(delta, axis).toRotationMatrix();
         const Analysis analysis = analysis_of(arrangement_of(word), 550);
         EXPECT_NEAR(analysis.power(R), expected, 1e-12) << choice_name(word) << " " << delta << " " << axis;
-        const Eigen::Vector4d S = analysis.stokes(R);
+        const Eigen::Vector4d S = stokes(arrangement_of(word), R);
         EXPECT_NEAR(S[0] * S[0], S.tail<3>().squaredNorm(), 1e-12);
         EXPECT_NEAR(S[0], 1, 1e-12);
         // All elements turned with the specimen.
@@ -129,8 +134,8 @@ TEST(Polariscope, TheAnalyserMeasuresFractionsOfAnOrder) {
 TEST(Polariscope, StokesParametersKnowTheSenseOfCircularLight) {
   // The slow axis, at 45°, is behind: its wave comes later, so that the picture shows light that turns clockwise, and
   // who faces the light sees it turn the other way.
-  const Analysis analysis = analysis_of({{{ElementKind::polarizer, 0}}, {{ElementKind::polarizer, 90}}}, 550);
-  const Eigen::Vector4d S = analysis.stokes(retarder(pi / 2, pi / 4).toRotationMatrix());
+  const Eigen::Vector4d S = stokes({{{ElementKind::polarizer, 0}}, {{ElementKind::polarizer, 90}}},
+                                   retarder(pi / 2, pi / 4).toRotationMatrix());
   // The plate of a quarter wave with its fast axis at −45°, along which light comes first: (1, −1) and (1, 1).
   const std::complex<double> i(0, 1), along = std::exp(i * pi / 4.0), across = std::exp(-i * pi / 4.0);
   const Eigen::Vector2cd jones((along + across) / 2.0, (across - along) / 2.0);
@@ -307,7 +312,7 @@ double disc_error(int voxels) {
   const double orders = 3;                  // At the middle: σ₁ − σ₂ = 4/π.
   light.strength = pi * orders / (4 / pi);  // The slab is 1 thick.
   const Plate plate = plate_of(light, {150, 150}, 1.9);
-  const PolarView view(arrangement_of(ArrangementWord::circular), light.bands, {Vector3d::Ones()});
+  const PolarView view(arrangement_of(ArrangementWord::circular), light.bands, {Vector3d::Ones()}, false);
   double error = 0;
   for (int y = 0; y < 150; y += 7) {
     const LightRow row = row_of(field, light, plate, y);
@@ -317,7 +322,7 @@ double disc_error(int voxels) {
       if (r2 > 0.9 || std::abs(p.y()) > 0.7) continue;
       const double difference = 4 / pi * (1 - r2) / (std::pow(r2 + 1, 2) - 4 * p.y() * p.y());
       std::vector<float> powers(row.room);
-      view.powers(row, x, powers.data());
+      view.spectrum(row, x, powers.data());
       error = std::max(error, std::abs(powers[0] - std::pow(std::sin(light.strength * difference), 2)));
     }
   }

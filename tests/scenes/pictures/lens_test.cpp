@@ -36,7 +36,7 @@ TEST_F(Lens, WithoutAFieldThePictureIsTheImage) {
   write("scene.json", small_lens(R"("image": "photo.png")", no_bending));
   for (const std::string settings : {"integrator.mode=gather", "integrator.mode=scatter", "bending.rgb=[0.1,0.2,0.3]",
                                      "light.spectrum=A", "integrator.image_plane.depth=0.5"}) {
-    render({settings}, {"out.png"});
+    render({settings, "output.view=Un-tone-mapped"}, {"out.png"});
     const Image seen = read_image(in_folder("out.png"));
     ASSERT_EQ(seen.width, 48);
     ASSERT_EQ(seen.channels.size(), 4u);
@@ -130,7 +130,7 @@ TEST_F(Lens, AlphaIsMultipliedInWhereTheFormatWantsItSo) {
   for (std::size_t i = 0; i < picture.pixels.size(); ++i) picture.pixels[i] = i % 4 == 3 ? 0.5f : 1;
   write_image(in_folder("photo.png"), picture);
   write("scene.json", small_lens(R"("image": "photo.png")", no_bending));
-  const Settings small{"receiver.resolution=[2,2]", "receiver.size=[2,2]"};
+  const Settings small{"receiver.resolution=[2,2]", "receiver.size=[2,2]", "output.view=Un-tone-mapped"};
   const Image linear = render(small, {"out.png"}), shown = read_image(in_folder("out.png"));
   EXPECT_NEAR(channel(linear, "R")[0], 0.5, 1e-4);
   EXPECT_NEAR(channel(linear, "A")[0], 0.5, 1e-4);
