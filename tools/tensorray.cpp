@@ -64,10 +64,6 @@ int main(int argc, char** argv) {
   tensorray::add_schema_command(app);
   return tensorray::run_and_report([&] {
     require_known_command(app, argc, argv);
-    try {
-      app.parse(argc, argv);
-    } catch (const CLI::Success& request) {  // --help, --version
-      app.exit(request);
-    }
+    tensorray::parse(app, argc, argv);
   });
 }

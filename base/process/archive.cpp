@@ -1,6 +1,7 @@
 #include "base/process/archive.h"
 
 #include <limits>
+#include <new>
 
 #include <zlib.h>
 
@@ -27,8 +28,9 @@ void Archive::copy_packed(void* values, std::size_t count, std::size_t size) {
     transpose(static_cast<const char*>(values), count, size, false, planes.data());
     uLongf length = compressBound(planes.size());
     packed.resize(length);
-    compress2(reinterpret_cast<Bytef*>(packed.data()), &length, reinterpret_cast<const Bytef*>(planes.data()),
-              planes.size(), quickly);
+    if (compress2(reinterpret_cast<Bytef*>(packed.data()), &length, reinterpret_cast<const Bytef*>(planes.data()),
+                  planes.size(), quickly) != Z_OK)
+      throw std::bad_alloc();
     packed.resize(length);
     return copy_list(packed);
   }

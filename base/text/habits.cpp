@@ -24,7 +24,7 @@ constexpr Habit habits[] = {
     {" noisethreshold noiselevel ", "integrator.noise, the error at which a pixel is done"},
     {" bounces maxbounces raydepth depth ", "integrator.max_depth"},
     {" transparent alpha ", "integrator.background: \"transparent\""},
-    {" intensity power multiplier radiance energy ", "strength, of an item of lights"},
+    {" intensity power multiplier radiance energy ", "strength, of an item of lights; light.irradiance of the plate's"},
     {" sunangle sunsize angulardiameter ", "angle, degrees, of an item of lights of kind \"directional\""},
     {" envmap hdri skydome domelight environmentmap ", "file, of an item of lights of kind \"environment\""},
     {" basecolor albedo diffuse diffusecolor reflectance ", "material.color, linear Rec. 709"},

@@ -57,8 +57,8 @@ StretchSettings settings_of(const Scene& scene, const StretchDescription& descri
   return settings;
 }
 
-ImageMetadata metadata_of(const StretchSettings& settings) {
-  const Eigen::Vector3d& direction = settings.direction;
+ImageMetadata metadata_of(const StretchSettings& settings, const SceneDescription& scene) {
+  const Eigen::Vector3d direction = scene.turn().transpose() * settings.direction;  // In the axes of its file.
   return {{"tensorray:units", "1/length"},
           {"tensorray:length", fmt::format("{}", settings.length)},
           {"tensorray:flexibility", fmt::format("{}", settings.flexibility)},
@@ -111,7 +111,7 @@ class LoadedStretch : public LoadedMethod {
     const OutputDescription& output = scene.description.output;
     const Geometry geometry = without_plate(scene);
     Render result;
-    result.metadata = metadata_of(settings_);
+    result.metadata = metadata_of(settings_, scene.description);
     if (output.wants("stretch")) {
       result.grids.push_back(
           stretch_grid(scene.field, geometry, scene.bending, settings, description_.resolution, progress));

@@ -15,6 +15,7 @@
 #include "python/module/arrays.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
+#include "scenes/scene/turning.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/invariants.h"
 
@@ -22,12 +23,14 @@ namespace tensorray {
 
 std::string Field::source() const { return keys_.contains("file") ? keys_["file"] : keys_["generate"]["kind"]; }
 
-LoadedField Field::loaded(const FieldChoices& choices) const {
+LoadedField Field::loaded(const FieldChoices& choices, const Eigen::Matrix3d& turn) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!loaded_ || choices_ != choices) {
+  if (!loaded_ || choices_ != choices || turn_ != turn) {
     loaded_.reset();  // Its memory is needed.
-    loaded_ = prepare_field(blocks_, choices, source());
+    const bool is_turned = turn != Eigen::Matrix3d::Identity() && !keys_.contains("generate");
+    loaded_ = prepare_field(is_turned ? turned(blocks_, turn) : blocks_, choices, source());
     choices_ = choices;
+    turn_ = turn;
   }
   return *loaded_;
 }

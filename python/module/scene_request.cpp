@@ -69,7 +69,8 @@ RequestedScene read_request(const SceneRequest& request) {
 Scene load_request(const SceneRequest& request, const RequestedScene& scene, const Progress& progress) {
   if (!request.field) return load_scene(scene.description, progress);
   progress.update("loading", 0, 1);
-  return load_scene(scene.description, progress, request.field->loaded(choices_of(scene.description)));
+  const SceneDescription& description = scene.description;
+  return load_scene(description, progress, request.field->loaded(choices_of(description), description.turn()));
 }
 
 void add_scene_request(pybind11::module_& module) {

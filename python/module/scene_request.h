@@ -37,8 +37,10 @@ class Field {
   TensorGrid grid() const { return to_grid(blocks_); }
   const TriangleMesh& surface() const { return blocks_.surface; }
 
-  /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if a choice differs.
-  LoadedField loaded(const FieldChoices& choices) const;
+  /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if a choice or the turn
+  /// differs.
+  /// @param turn  A rotation, of all fields but those that are generated.
+  LoadedField loaded(const FieldChoices& choices, const Eigen::Matrix3d& turn = Eigen::Matrix3d::Identity()) const;
 
  private:
   Json keys_;
@@ -46,6 +48,7 @@ class Field {
   pybind11::object memory_;
   mutable std::mutex mutex_;
   mutable FieldChoices choices_;
+  mutable Eigen::Matrix3d turn_ = Eigen::Matrix3d::Identity();
   mutable std::optional<LoadedField> loaded_;
 };
 

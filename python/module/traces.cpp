@@ -202,11 +202,11 @@ void put_plate(py::dict& arrays, const Plate& plate) {
   arrays["resolution"] = py::make_tuple(plate.resolution.x(), plate.resolution.y());
 }
 
-/// World positions of starts, which are in the beam's frame.
-std::vector<Eigen::Vector3d> world_starts(const FlowMap& map, const Beam& beam) {
+/// World positions of starts, which are in the beam's frame. @param back  From the program's axes to the scene's.
+std::vector<Eigen::Vector3d> world_starts(const FlowMap& map, const Beam& beam, const Eigen::Matrix3d& back) {
   std::vector<Eigen::Vector3d> starts;
   for (const Eigen::Vector2d& start : map.starts)
-    starts.push_back(beam.center + start.x() * beam.right + start.y() * beam.up);
+    starts.push_back(back * (beam.center + start.x() * beam.right + start.y() * beam.up));
   return starts;
 }
 
@@ -221,8 +221,11 @@ py::dict arrays_of(FlowMap map, const Scene& scene, std::vector<double> flexibil
     areas.push_back(triangle.area);
   }
   py::dict arrays;
-  put_plate(arrays, *scene.geometry.surfaces().plate);
-  arrays["starts"] = taken_matrices(world_starts(map, scene.beam), {starts, 3});
+  const Eigen::Matrix3d back = scene.description.turn().transpose();
+  Plate plate = *scene.geometry.surfaces().plate;
+  for (Eigen::Vector3d* vector : {&plate.center, &plate.right, &plate.up}) *vector = (back * *vector).eval();
+  put_plate(arrays, plate);
+  arrays["starts"] = taken_matrices(world_starts(map, scene.beam, back), {starts, 3});
   arrays["landings"] = taken_matrices(std::move(map.landings), {starts, wavelengths, 2});
   arrays["ends"] = ends_array(std::move(map.ends), {starts, wavelengths});
   arrays["triangles"] = taken(std::move(corners), {triangles, 3});

@@ -86,26 +86,28 @@ const std::map<int, IntegerType> integer_types{{5120, {1, float_of<std::int8_t>}
                                                {5122, {2, float_of<std::int16_t>}},
                                                {5123, {2, float_of<std::uint16_t>}}};
 
-/// Makes an accessor of three integers one of three floats.
+/// Makes an accessor of two or three integers one of as many floats.
 void make_floats(const fs::path& path, Json& json, std::size_t index, Files& files) {
   Json& accessor = json.at("accessors").at(index);
   const auto type = integer_types.find(accessor.at("componentType").get<int>());
   if (type == integer_types.end() || !accessor.contains("bufferView")) return;
   const std::string name = "its accessor " + std::to_string(index);
-  if (accessor.contains("sparse") || accessor.value("type", "") != "VEC3")
-    throw std::runtime_error(name + " has sparse integers, or not three; write it again without quantization");
+  const std::string kind = accessor.value("type", "");
+  if (accessor.contains("sparse") || (kind != "VEC2" && kind != "VEC3"))
+    throw std::runtime_error(name + " has sparse integers, or not two or three; write it again without quantization");
+  const std::size_t parts = kind == "VEC2" ? 2 : 3;
   const Json view = json.at("bufferViews").at(accessor.at("bufferView").get<std::size_t>());
   const std::string& bytes = buffer_of(path, json, view.at("buffer").get<std::size_t>(), files);
-  const std::size_t count = accessor.at("count").get<std::size_t>(), size = 3 * type->second.bytes;
+  const std::size_t count = accessor.at("count").get<std::size_t>(), size = parts * type->second.bytes;
   const std::size_t stride = view.value("byteStride", size);
   const std::size_t first = view.value("byteOffset", std::size_t{0}) + accessor.value("byteOffset", std::size_t{0});
   if (count == 0 || stride < size || first > bytes.size() || (bytes.size() - first + stride - size) / stride < count)
     throw std::runtime_error(name + " is beyond its buffer: the file is damaged or cut off");
   std::string& floats = files[floats_name];
   json["bufferViews"].push_back(
-      {{"buffer", json.at("buffers").size()}, {"byteOffset", floats.size()}, {"byteLength", 12 * count}});
-  for (std::size_t i = 0; i < 3 * count; ++i) {
-    const char* const at = &bytes[first + i / 3 * stride + i % 3 * type->second.bytes];
+      {{"buffer", json.at("buffers").size()}, {"byteOffset", floats.size()}, {"byteLength", 4 * parts * count}});
+  for (std::size_t i = 0; i < parts * count; ++i) {
+    const char* const at = &bytes[first + i / parts * stride + i % parts * type->second.bytes];
     append_number(type->second.read(at, accessor.value("normalized", false)), ByteOrder::little, floats);
   }
   accessor["bufferView"] = json["bufferViews"].size() - 1;
@@ -129,7 +131,8 @@ void check_extensions(const Json& json) {
   }
 }
 
-/// The accessors of positions and normals. Removes all other attributes but those of skins, which have no geometry.
+/// The accessors of positions, normals and texture coordinates. Removes all other attributes but those of skins, which
+/// have no geometry.
 std::set<std::size_t> geometry_of(Json& json) {
   std::set<std::size_t> accessors;
   for (Json& mesh : json.at("meshes"))
@@ -137,7 +140,7 @@ std::set<std::size_t> geometry_of(Json& json) {
       primitive.erase("targets");
       Json kept = Json::object();
       for (const auto& [name, accessor] : primitive.at("attributes").items()) {
-        const bool is_geometry = name == "POSITION" || name == "NORMAL";
+        const bool is_geometry = name == "POSITION" || name == "NORMAL" || name == "TEXCOORD_0";
         if (is_geometry) accessors.insert(accessor.get<std::size_t>());
         if (is_geometry || starts_with(name, "JOINTS_") || starts_with(name, "WEIGHTS_")) kept[name] = accessor;
       }

@@ -83,8 +83,6 @@ void check_finite(const MeshWithNormals& mesh) {
   for (std::size_t i = 0; i < mesh.mesh.vertices.size(); ++i)
     if (!mesh.mesh.vertices[i].cast<float>().allFinite())
       throw std::runtime_error("vertex " + std::to_string(i) + " is not finite in single precision");
-  for (const Eigen::Vector2f& place : mesh.places)
-    if (!place.allFinite()) throw std::runtime_error("a texture coordinate is not finite");
   for (std::size_t i = 0; i < mesh.normals.size(); ++i)
     if (!mesh.normals[i].allFinite())
       throw std::runtime_error("the normal of vertex " + std::to_string(i) + " is not finite");

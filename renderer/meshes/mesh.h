@@ -18,7 +18,7 @@ struct MeshWithNormals {
   /// For each vertex, any length; zero: none is known. Empty: no vertex has one.
   std::vector<Eigen::Vector3f> normals;
   /// The place of each vertex in pictures on the mesh: (0, 0) is the lower left corner, (1, 1) the upper right one.
-  /// Empty: the file has none.
+  /// Empty: the file has none. Not finite: the file says so, or names one that is not there.
   std::vector<Eigen::Vector2f> places;
 };
 

@@ -1,4 +1,5 @@
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <optional>
@@ -16,11 +17,11 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-constexpr std::uint32_t none = 0xffffffff;
+constexpr std::uint32_t none = 0xffffffff, missing = none - 1;
 
 /// A corner of a face: its vertex, place and normal, from 0.
 struct ObjCorner {
-  std::uint32_t vertex = none, place = none, normal = none;
+  std::uint32_t vertex = none, place = none, normal = none;  ///< `missing`: of a place that is not there.
 };
 
 struct ObjFace {
@@ -61,16 +62,16 @@ Eigen::Vector3d vertex_of(const Words& words) {
   return position / weight;
 }
 
-/// An index, which counts from 1, or backwards from -1, the last of `count`.
-std::uint32_t index_of(const std::string& word, std::size_t count, const char* what) {
+/// An index, which counts from 1, or backwards from -1, the last of `count`. @param must  Else it may be `missing`.
+std::uint32_t index_of(const std::string& word, std::size_t count, const char* what, bool must = true) {
   std::int64_t index = 0;
   const std::from_chars_result result = std::from_chars(word.data(), word.data() + word.size(), index);
   if (result.ec != std::errc() || result.ptr != word.data() + word.size())
     throw std::runtime_error("the face has \"" + escaped(word.substr(0, 20)) + "\" where it should name a " + what);
   const std::int64_t from_zero = index < 0 ? static_cast<std::int64_t>(count) + index : index - 1;
-  if (index == 0 || from_zero < 0 || from_zero >= none)
-    throw std::runtime_error("the face names " + std::string(what) + " " + word + ", which is not there");
-  return static_cast<std::uint32_t>(from_zero);
+  if (from_zero >= 0 && from_zero < missing) return static_cast<std::uint32_t>(from_zero);
+  if (must) throw std::runtime_error("the face names " + std::string(what) + " " + word + ", which is not there");
+  return missing;
 }
 
 /// u, u v or u v w.
@@ -80,14 +81,15 @@ Eigen::Vector2f place_of(const Words& words) {
           words.size() > 2 ? static_cast<float>(component_of(words[2])) : 0.0f};
 }
 
-/// v, v/vt, v//vn or v/vt/vn. Texture coordinates need not exist.
+/// v, v/vt, v//vn or v/vt/vn. Texture coordinates need not exist: only pictures ask for them.
 ObjCorner obj_corner_of(const std::string& word, const ObjContents& contents) {
   const std::size_t first = word.find('/');
   const std::size_t second = first == std::string::npos ? first : word.find('/', first + 1);
   ObjCorner corner;
   corner.vertex = index_of(word.substr(0, first), contents.vertices.size(), "vertex");
   if (first != std::string::npos && first + 1 < std::min(second, word.size()))
-    corner.place = index_of(word.substr(first + 1, second - first - 1), contents.places.size(), "texture coordinate");
+    corner.place =
+        index_of(word.substr(first + 1, second - first - 1), contents.places.size(), "texture coordinate", false);
   if (second != std::string::npos && second + 1 < word.size())
     corner.normal = index_of(word.substr(second + 1), contents.normals.size(), "normal");
   return corner;
@@ -156,6 +158,12 @@ void check_corner(const ObjCorner& corner, const ObjContents& contents) {
   check(corner.normal, contents.normals.size(), "normal");
 }
 
+/// Not finite if the corner names one that is not there.
+Eigen::Vector2f place_at(const ObjCorner& corner, const ObjContents& contents) {
+  if (corner.place == none) return {0, 0};
+  return corner.place < contents.places.size() ? contents.places[corner.place] : Eigen::Vector2f(NAN, NAN);
+}
+
 /// Adds the face whose corners are [first, end). Each corner becomes a vertex; mesh.cpp joins those that are equal.
 void add_obj_face(const ObjContents& contents, std::size_t first, std::size_t end, MeshWithNormals& result) {
   std::vector<std::uint32_t> vertices;
@@ -167,9 +175,7 @@ void add_obj_face(const ObjContents& contents, std::size_t first, std::size_t en
     const bool has_normal = corner.normal != none;
     if (!contents.normals.empty())
       result.normals.push_back(has_normal ? contents.normals[corner.normal] : Eigen::Vector3f(0, 0, 0));
-    const bool has_place = corner.place < contents.places.size();
-    if (!contents.places.empty())
-      result.places.push_back(has_place ? contents.places[corner.place] : Eigen::Vector2f(0, 0));
+    if (!contents.places.empty()) result.places.push_back(place_at(corner, contents));
   }
   add_polygon(vertices, result.mesh);
 }

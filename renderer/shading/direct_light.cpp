@@ -93,7 +93,7 @@ void add_to_groups(Wavefront& front, const PathState& path, const BandValues& li
     scene.lights.background(source.direction, radiance, source.disks, each, path.bands());
     auto layer = layer_of(each);
     for (std::size_t band = 0; band < radiance.size(); ++band)
-      if (const auto i = static_cast<Eigen::Index>(band); radiance[band] > 0)
+      if (const auto i = static_cast<Eigen::Index>(band); radiance[band] > 0 && (*source.radiance)[band] > 0)
         layer[i] += light[i] * radiance[band] / (*source.radiance)[band];
   }
 }

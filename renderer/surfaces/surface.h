@@ -54,7 +54,7 @@ struct ShadedSurface {
 
   std::vector<Eigen::Vector3f> colors;  ///< For each point; working space, 0 to 1. Empty: the material's reflectance.
   std::shared_ptr<const SurfaceTexture> texture;  ///< Colours of a flat surface, instead of `colors`; or null.
-  std::vector<Eigen::Vector2f> places;            ///< For each point, meshes only: u and v of `pictures`.
+  std::vector<Eigen::Vector2f> places;            ///< For each point, meshes only: u and v of `pictures`; else unused.
   std::shared_ptr<const MeshPictures> pictures;   ///< Of a mesh with places; or null.
   std::vector<float> forces;                      ///< For each point.
   std::vector<float> arc_lengths;                 ///< For each point.

@@ -74,7 +74,7 @@ void require_valid(const ShadedSurface& surface) {
   };
   require(fits(surface.normals), "there must be no normals, or a finite one for each point");
   require(fits(surface.colors), "there must be no colors, or a finite one for each point");
-  require(fits(surface.places) && (!surface.pictures || !surface.places.empty()),
+  require(!surface.pictures || (fits(surface.places) && !surface.places.empty()),
           "a mesh with pictures must have a finite place for each point");
   require(fits(surface.forces), "there must be no forces, or a finite one for each point");
   require(fits(surface.arc_lengths), "there must be no arc_lengths, or a finite one for each point");

@@ -87,7 +87,11 @@ void check_objects(const SceneDescription& scene, const SceneSource& source) {
   }
 }
 
-void check_layers(const SceneDescription& scene, const SceneSource& source) {
+void check_layers(SceneDescription& scene, const Json& json, const SceneSource& source) {
+  const bool is_made = scene.output.wants("exr") || given(json, "/output/exr");
+  for (const char* key : {"/output/exr_type", "/output/exr_layers"})
+    if (!is_made && given(json, key))
+      scene.warnings.push_back(fmt::format("`{}` has no effect without `/output/exr`", key));
   if (!scene.output.exr_layers) return;
   std::vector<std::string> known;
   for (const std::string& channel : scene.integrator.method().channels(scene))
@@ -96,7 +100,8 @@ void check_layers(const SceneDescription& scene, const SceneSource& source) {
   for (const std::string& layer : *scene.output.exr_layers)
     if (std::find(known.begin(), known.end(), layer) == known.end())
       source.fail(fmt::format("`/output/exr_layers`: {} makes no layer \"{}\"; it makes {}",
-                              scene.integrator.method().name(), layer, joined(known)));
+                              scene.integrator.method().name(), layer,
+                              known.empty() ? "none beside R, G, B and A; remove the key" : joined(known)));
 }
 
 /// Removes outputs that only another method can make, with a warning. @throw SceneError if no output is left.
@@ -174,7 +179,7 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   check_lights(scene, source);
   check_objects(scene, source);
   drop_unmade_outputs(scene, source);
-  check_layers(scene, source);
+  check_layers(scene, json, source);
   for (const auto& method : scene.integrator.methods)
     method->check(scene, json, source, method.get() == &scene.integrator.method());
   check_files(scene);

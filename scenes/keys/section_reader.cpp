@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 
 #include "base/text/habits.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 namespace {
@@ -37,9 +38,9 @@ std::string quoted_list(const std::vector<std::string>& names, const char* separ
   return list;
 }
 
-/// "did you mean `light`?"; if no known key is similar to `key`, the list of known keys.
-std::string suggestion(const std::string& key, const std::set<std::string>& known) {
-  if (const std::string here = name_here(key); !here.empty()) return "here it is " + here;
+/// "did you mean `light`?"; if no known key is similar to `key`, what it is here, or the list of known keys.
+/// @param pointer  Of the section; places within deeper ones are not the camera's.
+std::string suggestion(const std::string& key, const std::string& pointer, const std::set<std::string>& known) {
   constexpr std::size_t longest = 64;  // All keys are shorter. edit_distance takes quadratic time.
   std::string nearest;
   std::size_t least = key.size() > longest ? 0 : std::max<std::size_t>(2, key.size() / 2);
@@ -51,6 +52,9 @@ std::string suggestion(const std::string& key, const std::set<std::string>& know
     least = distance;
   }
   if (!nearest.empty()) return fmt::format("did you mean `{}`?", nearest);
+  const std::string here = name_here(key);
+  const bool is_elsewhere = starts_with(here, "camera.") && pointer.find('/', 1) != std::string::npos;
+  if (!here.empty() && !is_elsewhere) return "here it is " + here;
   return "known keys are " + quoted_list({known.begin(), known.end()}, ", ");
 }
 
@@ -196,7 +200,7 @@ void SectionReader::exclude(const char* key, std::initializer_list<const char*> 
 void SectionReader::refuse_unknown_keys() const {
   for (const auto& item : object_.items()) {
     if (known_.count(item.key()) > 0) continue;
-    source_.fail(fmt::format("unknown key `{}`; {}", pointer_to(item.key()), suggestion(item.key(), known_)));
+    source_.fail(fmt::format("unknown key `{}`; {}", pointer_to(item.key()), suggestion(item.key(), pointer_, known_)));
   }
 }
 

@@ -80,6 +80,7 @@ void write_maps(const std::filesystem::path& file, const Scene& scene, const Ren
   const Eigen::Vector2d pixel = plate.pixel_size();
   maps.to_world.linear() << pixel.x() * plate.right, pixel.y() * plate.up, (range.far - range.near) * plate.normal();
   maps.to_world.translation() = plate.to_world({0.5, plate.resolution.y() - 0.5}) + 0.5 * (range.near + range.far) * V;
+  maps.to_world = scene.description.turn().transpose() * maps.to_world;
   const std::size_t channels = maps.names.size();
   for (std::size_t channel = 0; channel < channels; ++channel)
     for (int y = render.linear.height - 1; y >= 0; --y)  // Rows of pictures come from the top.

@@ -306,6 +306,11 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
   return scale;
 }
 
+/// A direction in the axes of the scene's file, without -0.
+Eigen::Vector3d shown(const SceneDescription& description, const Eigen::Vector3d& direction) {
+  return description.turn().transpose() * direction + Eigen::Vector3d::Zero();
+}
+
 /// The direction of the light, if the scene leaves it open. The choice ignores obstacles, too.
 Eigen::Vector3d load_direction(const SceneDescription& description, const TensorField& field, const Progress& progress,
                                std::vector<std::string>& notes) {
@@ -316,15 +321,16 @@ Eigen::Vector3d load_direction(const SceneDescription& description, const Tensor
     for (const int axis : {1, 0})
       if (sizes[axis] < (1 - 1e-6) * sizes[shortest]) shortest = axis;
     const Eigen::Vector3d V = -Eigen::Vector3d::Unit(shortest) + Eigen::Vector3d::Zero();
-    notes.push_back(fmt::format("light: along [{:g}, {:g}, {:g}], where the field is thinnest", V.x(), V.y(), V.z()));
+    notes.push_back(
+        fmt::format("light: along [{:g}], where the field is thinnest", fmt::join(shown(description, V), ", ")));
     return V;
   }
   const AutoDirection chosen = choose_direction(field, Geometry(load_volume(description, field)),
                                                 description.light.up.value_or(Eigen::Vector3d::UnitZ()), progress);
   const Eigen::Vector3d V = chosen.direction + Eigen::Vector3d::Zero();  // 0, not -0.
   if (description.integrator.method().needs_light_direction(description))
-    notes.push_back(fmt::format("light: along [{:.3g}, {:.3g}, {:.3g}], where it shows most of 26 directions", V.x(),
-                                V.y(), V.z()));
+    notes.push_back(fmt::format("light: along [{:.3g}], where it shows most of 26 directions",
+                                fmt::join(shown(description, V), ", ")));
   return V;
 }
 

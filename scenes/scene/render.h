@@ -56,7 +56,7 @@ bool nothing_arrived(const Statistics& statistics);
 struct PictureView {
   Eigen::Vector3d right, up;         ///< Unit; along x of the picture, and against its y.
   std::optional<double> pixel_size;  ///< Of all pixels along x, world units; none: of a perspective camera.
-  std::optional<Plate> plate = {};   ///< That has the pixels; none: of a camera.
+  std::optional<Plate> plate = {};   ///< That has the pixels, in the program's axes; none: of a camera.
 };
 
 struct Render {

@@ -47,7 +47,7 @@ Render turned(Render render, const Eigen::Matrix3d& turn) {
   for (ScalarGrid& grid : render.grids) grid.to_world = turn * grid.to_world;
   turn_paths(render.paths, turn);
   if (render.view)
-    render.view = PictureView{turn * render.view->right, turn * render.view->up, render.view->pixel_size};
+    for (Eigen::Vector3d* vector : {&render.view->right, &render.view->up}) *vector = (turn * *vector).eval();
   return render;
 }
 

@@ -80,9 +80,10 @@ class RendersTest(unittest.TestCase):
     def test_a_field_object_gives_the_bytes_of_its_file(self):
         self.assertEqual(command_line(self.folder, "make", "vortex", "-o", "f.vdb", "--resolution", "16").returncode, 0)
         file = self.path("f.vdb")
-        scene = {**PHOTONS, "field": {"file": file, "eigenvalues": "raw"}}
-        self.same_files(scene, [".exr", ".png"], field=tr.read_vdb(file),
-                        scene_for_python={**PHOTONS, "field": {"eigenvalues": "raw"}})
+        field = tr.read_vdb(file)
+        for up in ("z", "y"):
+            scene = {**PHOTONS, "world": {"up": up}, "field": {"file": file, "eigenvalues": "raw"}}
+            self.same_files(scene, [".exr", ".png"], field, {**scene, "field": {"eigenvalues": "raw"}})
         without = {key: value for key, value in PHOTONS.items() if key != "field"}
         self.same_files({"field": FIELD, **without}, [".exr"], field=tr.make(**FIELD["generate"]),
                         scene_for_python=without)
@@ -108,8 +109,9 @@ class RendersTest(unittest.TestCase):
         self.assertEqual(bytes_of(self.folder, "python.02.exr"), bytes_of(self.folder, "program.02.exr"))
         picture.write(self.path("later.##.exr"))
         self.assertEqual(bytes_of(self.folder, "later.02.exr"), bytes_of(self.folder, "program.02.exr"))
-        map_ = tr.landings(turning, s=0.2, frame=3, changes=changes)
-        np.testing.assert_allclose(np.cross(map_.right, map_.up) @ [0, 2, -1], -np.sqrt(5), rtol=1e-9)
+        for up in ("z", "y"):
+            map_ = tr.landings(turning, s=0.2, frame=3, changes={**changes, "world.up": up})
+            np.testing.assert_allclose(np.cross(map_.right, map_.up) @ [0, 2, -1], -np.sqrt(5), rtol=1e-9)
         with self.assertRaisesRegex(tr.SceneError, "frame=1"):
             tr.render(turning)
 

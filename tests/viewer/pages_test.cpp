@@ -257,6 +257,10 @@ TEST_F(LiveSceneTest, PicturesAfterChangesAreThoseOfANewScene) {
   change("/integrator/density", {{"kind", "histogram"}});
   change("/integrator/type", "lens");
   change("/output/exposure", -1);
+  change("/world", {{"up", "y"}});
+  change("/camera", {{"direction", {0, -1, 0}}, {"resolution", {8, 8}}});
+  change("/integrator", {{"type", "scene"}, {"max_samples", 1}, {"min_samples", 1}});
+  change("/camera/direction", {1, 0, 0});
   versions.push_back(test::small_scene());
   for (const Json& version : versions) {
     LiveScene anew(scene_file());

@@ -7,7 +7,7 @@
 #include <new>
 #include <system_error>
 
-#include <CLI/Error.hpp>
+#include <CLI/CLI.hpp>
 #include <unistd.h>
 
 #include "base/process/child_program.h"
@@ -20,6 +20,7 @@ namespace tensorray {
 namespace {
 
 constexpr int failed = 1, wrong_input = 2, interrupted = 130;
+const char* const help_advice = " (--help says more)";
 
 int report(const std::string& what, int status) {
   print_error("tensorray: " + escaped(what) + "\n");
@@ -61,10 +62,13 @@ Progress progress;
 std::atomic<bool> picture_request{false};
 
 /// For a message that names an option which is not there: the key that does what it does elsewhere.
-std::string advice_on_option(const std::string& message) {
-  const std::size_t begin = message.find("--"), end = message.find(' ', begin);
-  const std::string here = begin == std::string::npos ? "" : name_here(message.substr(begin, end - begin));
-  return here.empty() ? " (--help says more)" : "; it is a key of the scene, for --set: " + here;
+std::string advice_on_option(const std::string& message, const CLI::App& program) {
+  const CLI::App* command = &program;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().front();
+  const std::size_t begin = message.find("--"), end = message.find_first_of(" =", begin);
+  const bool has_keys = begin != std::string::npos && command->get_option_no_throw("--set") != nullptr;
+  const std::string here = has_keys ? name_here(message.substr(begin, end - begin)) : "";
+  return here.empty() ? help_advice : "; it is a key of the scene, for --set: " + here;
 }
 
 void on_interrupt(int) {
@@ -92,7 +96,7 @@ int run_and_report(const std::function<void()>& work) {
   } catch (const CLI::RuntimeError& child) {  // The child has printed the error.
     return child.get_exit_code();
   } catch (const CLI::ParseError& error) {
-    return report(error.what() + advice_on_option(error.what()), wrong_input);
+    return report(std::string(error.what()) + help_advice, wrong_input);
   } catch (const Cancelled&) {
     return report("interrupted; nothing was written", interrupted);
   } catch (const Interrupted& error) {
@@ -103,6 +107,18 @@ int run_and_report(const std::function<void()>& work) {
     return report(reason_of(error), failed);
   } catch (...) {
     return report("failed for an unknown reason", failed);
+  }
+}
+
+bool parse(CLI::App& program, int argc, char** argv) {
+  try {
+    program.parse(argc, argv);
+    return true;
+  } catch (const CLI::Success& request) {  // --help, --version
+    program.exit(request);
+    return false;
+  } catch (const CLI::ExtrasError& error) {
+    throw std::invalid_argument(error.what() + advice_on_option(error.what(), program));
   }
 }
 

@@ -9,6 +9,10 @@
 
 #include "base/process/progress.h"
 
+namespace CLI {
+class App;
+}
+
 namespace tensorray {
 
 /// Work that was interrupted, and kept what it had: exit status 130.
@@ -23,8 +27,11 @@ std::string reason_of(const std::exception& error);
 /// @return the exit status: 0 done, 1 failed, 2 the command line or the scene is wrong, 130 interrupted.
 int run_and_report(const std::function<void()>& work);
 
-/// The same for the program that started this one with run_program (base/process/child_program.h): ends with it, takes
-/// no more memory than there is, and prints an error without the program's name.
+/// Parses a program's arguments. @return false if they asked for help or the version, which is printed.
+bool parse(CLI::App& program, int argc, char** argv);
+
+/// The same as run_and_report for the program that started this one with run_program (base/process/child_program.h):
+/// ends with it, takes no more memory than there is, and prints an error without the program's name.
 int answer_parent(const std::function<void()>& work);
 
 /// Makes SIGINT (Ctrl-C) and SIGTERM cancel the returned progress, which lives as long as the program. A second

@@ -70,7 +70,7 @@ std::string scene_as_rendered(const Scene& scene) {
 }
 
 std::vector<std::string> choices_for(const Scene& scene) {
-  const Eigen::Vector3d& V = *scene.description.light.direction;
+  const Eigen::Vector3d V = scene.description.turn().transpose() * *scene.description.light.direction;
   std::vector<std::string> changes{fmt::format("light.direction=[{},{},{}]", V.x(), V.y(), V.z())};
   const Strength strength = scene.method->strength(scene);
   if (!strength.is_fixed) changes.push_back(fmt::format("{}.{}={}", strength.section, strength.key, strength.value));

@@ -174,7 +174,9 @@ Json describe_field(const Scene& scene) {
   const Eigen::Vector3i size = (voxels.sizes() + Vector3d::Ones()).array().round().matrix().cast<int>();
   Json corners = Json::array();
   for (const Vector3d& corner : scene.field.corners()) corners.push_back(to_json(corner));
-  return {{"voxels", {size.x(), size.y(), size.z()}}, {"corners", in_axes_of(scene, std::move(corners))}};
+  return {{"voxels", {size.x(), size.y(), size.z()}},
+          {"corners", in_axes_of(scene, std::move(corners))},
+          {"y_up", scene.description.world.up == UpAxis::y}};
 }
 
 Json describe_choices(const Scene& scene, const Render& render) {

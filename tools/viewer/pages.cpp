@@ -386,7 +386,7 @@ void Pages::look(Page& page, const Json& message) {
 
 void Pages::space(Page& page, const Json& message) {
   if (!page.shown.is_object()) throw std::invalid_argument("there is no scene yet");
-  Json meshes_of{page.shown.value("obstacles", Json()),
+  Json meshes_of{page.shown.value("obstacles", Json()), page.shown.value("world", Json()),
                  page.shown.value("field", Json::object()).value("bounds", Json())};
   Json content = describe_space(live_.scene(), page.meshes_of != meshes_of);
   content["field"] = describe_field(live_.scene());

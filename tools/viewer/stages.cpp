@@ -57,10 +57,15 @@ Json without(Json section, const std::vector<const char*>& keys) {
   return section;
 }
 
-/// What automatic scale and direction depend on.
-Json choice_keys(const Json& scene) {
-  const Json light = section(scene, "light");
-  return {without(section(scene, "field"), {"scale"}), light.value("direction", Json()), light.value("up", Json())};
+/// What the automatic direction depends on.
+Json direction_keys(const Json& scene) {
+  return {without(section(scene, "field"), {"scale"}), section(scene, "light").value("up", Json()),
+          section(scene, "world"), section(scene, "integrator").value("type", Json())};
+}
+
+/// What the automatic scale depends on.
+Json scale_keys(const Json& scene) {
+  return {direction_keys(scene), section(scene, "light").value("direction", Json()), section(scene, "camera")};
 }
 
 Json with_names(Json scene, const std::vector<std::filesystem::path>& outputs) {
@@ -72,7 +77,8 @@ Json with_names(Json scene, const std::vector<std::filesystem::path>& outputs) {
 /// What the way of a ray through the volume depends on.
 Json ray_keys(const Json& json, const Scene& scene) {
   const Eigen::Vector3d& V = scene.beam.direction;
-  return {section(json, "field"), section(json, "bending"), scene.scale.scale, V.x(), V.y(), V.z()};
+  return {
+      section(json, "field"), section(json, "world"), section(json, "bending"), scene.scale.scale, V.x(), V.y(), V.z()};
 }
 
 /// What the picture in linear light depends on.
@@ -152,10 +158,10 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
   const Json loaded = with_names(json, outputs);
   if (scene_ && loaded == loaded_) return *scene_;
   SceneDescription description = read_scene_json(json, file_, {{}, outputs});
-  const bool chooses_anew = choice_keys(json) != chosen_for_;
+  const Json of_scale = scale_keys(json), of_direction = direction_keys(json);
   const bool chooses_scale = !description.field.scale, chooses_direction = !description.light.direction;
-  if (chooses_scale && !chooses_anew) description.field.scale = scale_;
-  if (chooses_direction && !chooses_anew) description.light.direction = direction_;
+  if (chooses_scale && of_scale == of_scale_) description.field.scale = scale_;
+  if (chooses_direction && of_direction == of_direction_) description.light.direction = direction_;
 
   Scene scene = load_scene(description, progress, field_of(scene_, description));
   // A change that moves all rays begins without a memory: it would cost time and give nothing.
@@ -166,15 +172,12 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
 
   // From here on nothing fails: the scene before is replaced as a whole.
   if (!has_picture(json, outputs)) render_.reset();
-  if (chooses_anew) {
-    scale_.reset();
-    direction_.reset();
-  }
-  if (chooses_scale) scale_ = scene.scale.scale;
-  if (chooses_direction) direction_ = scene.description.light.direction;
+  scale_ = chooses_scale ? std::optional(scene.scale.scale) : std::nullopt;
+  direction_ = chooses_direction ? scene.description.light.direction : std::nullopt;
   scene_.emplace(std::move(scene));
   loaded_ = loaded;
-  chosen_for_ = choice_keys(json);
+  of_scale_ = of_scale;
+  of_direction_ = of_direction;
   rays_of_ = rays;
   rendered_ = picture_keys(json, outputs);
   return *scene_;

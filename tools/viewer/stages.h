@@ -83,8 +83,9 @@ class LiveScene {
  private:
   std::filesystem::path file_;
   std::optional<Scene> scene_;
-  Json loaded_, chosen_for_, rendered_;  ///< What scene, automatic choices and picture were made of.
-  Json rays_of_;                         ///< What the rays depend on.
+  Json loaded_, rendered_;        ///< What scene and picture were made of.
+  Json of_scale_, of_direction_;  ///< What the automatic choices depend on.
+  Json rays_of_;                  ///< What the rays depend on.
   std::optional<double> scale_;
   std::optional<Eigen::Vector3d> direction_;
   std::shared_ptr<const Render> render_;

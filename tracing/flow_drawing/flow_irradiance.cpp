@@ -95,12 +95,13 @@ Plate part_of(const Plate& plate, Eigen::AlignedBox2d box, int resolution) {
 }
 
 /// Adds to each pixel of a plate the part of it on which the beam's straight light lands, times `weight`.
-void add_straight(const Beam& beam, const Plate& plate, float weight, std::vector<float>& straight) {
+/// @return false if it does not land, because it is along the plate or behind it.
+bool add_straight(const Beam& beam, const Plate& plate, float weight, std::vector<float>& straight) {
   std::vector<Vector2d> outline;
   for (const Vector2d& corner : beam.aperture) {
     const Vector3d start = beam.start(corner), direction = beam.direction_at(start);
     const double way = plate.normal().dot(plate.center - start) / plate.normal().dot(direction);
-    if (!(way > 0) || !std::isfinite(way)) return;  // Light along the plate.
+    if (!(way > 0) || !std::isfinite(way)) return false;
     outline.push_back(plate.to_pixel(start + way * direction));
   }
   const int width = plate.resolution.x(), height = plate.resolution.y();
@@ -122,6 +123,7 @@ void add_straight(const Beam& beam, const Plate& plate, float weight, std::vecto
       straight[static_cast<std::size_t>(y) * row.size() + x] +=
           weight * static_cast<float>(std::clamp(row[x] * unit, 0.0, 1.0));
   }
+  return true;
 }
 
 /// For the flexibilities of the light, as a range if they differ.
@@ -193,10 +195,11 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
   const FlowSettings tracing = flow_settings(light, result.plate, settings);
   const std::size_t channels = light.flexibilities.size() - 1;
   Ranks* const ranks = settings.job ? settings.job->ranks : nullptr;
+  bool is_known = !surfaces.body || light.passes == 1;  // Before a body's plane, tilted light is elsewhere.
   for (int pass = 0; pass < light.passes; ++pass) {
     Film irradiance;  // Of this direction.
     const Beam beam = beam_of(field, surfaces, plate, light, pass);
-    add_straight(beam, result.plate, 1.0f / static_cast<float>(light.passes), result.straight);
+    is_known = is_known && add_straight(beam, result.plate, 1.0f / static_cast<float>(light.passes), result.straight);
     const auto make = [&] {
       const FlowMap map = trace_flow_map(field, geometry, beam, settings.bending, tracing, progress);
       CausticSettings drawing;
@@ -223,6 +226,7 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
       result.irradiance.values[i] += irradiance.values[i];
   }
   for (double& value : result.irradiance.values) value /= light.passes;
+  if (!is_known) result.straight.clear();
   return result;
 }
 

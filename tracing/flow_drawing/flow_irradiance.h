@@ -38,6 +38,7 @@ struct FlowIrradiance {
   Film irradiance;  ///< A plane for each band; 1 is the irradiance of the beam on a surface that faces it; of a point
                     ///< light, that at a distance of 1.
   std::vector<float> straight;  ///< The part of each pixel on which light through the volume would land without field.
+                                ///< Empty: not known, of a disk's light on a body, or that grazes the plate.
   std::vector<float> folds;     ///< Number of sheets of the map at the middle of each pixel, for light of the middle of
                                 ///< the range, from the first direction.
 };

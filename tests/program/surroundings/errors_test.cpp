@@ -52,6 +52,8 @@ TEST_F(Errors, ScenesAndCommandLines) {
       {"threads", {"render", "scene.json", "--threads", "0"}},
       {"threads", {"render", "scene.json", "--threads", "many"}},
       {"--spp; it is a key of the scene, for --set: integrator.max_samples", {"render", "scene.json", "--spp", "64"}},
+      {"--spp=64; it is a key of the scene", {"render", "scene.json", "--spp=64"}},
+      {"--width .--help says more.", {"make", "vortex", "-o", "a.vdb", "--width", "9"}},
       {"one kind", {"render", "scene.json", "-o", "a.png", "-o", "b.jpg"}},
       {"--stats.*scene.json", {"render", "scene.json", "--stats", "scene.json"}},
       {"--stats.*a.png", {"render", "scene.json", "-o", "a.png", "--stats", "a.png"}},
@@ -63,6 +65,10 @@ TEST_F(Errors, ScenesAndCommandLines) {
   expect_scene_error(2, "unknown key `/lihgt`; did you mean `light`", "lihgt.photons=5");
   expect_scene_error(2, "unknown key `/camera/fov`; here it is camera.angle", "camera.fov=30");
   expect_scene_error(2, "unknown key `/integrator/spp`; here it is integrator.max_samples", "integrator.spp=64");
+  expect_scene_error(2, "/lights/0/location`; did you mean `position`", R"(lights=[{"location":[0,0,1]}])");
+  expect_scene_error(2, "/objects/0/path`; did you mean `paths`", R"(objects=[{"path":"a.obj"}])");
+  expect_scene_error(2, "/seeds/origin`; known keys are", "integrator.seeds.origin=[0,0,1]");
+  expect_scene_error(2, "/light/intensity`; here it is .*light.irradiance", "light.intensity=3");
   expect_scene_error(2, "poisson_ratio", "field.generate.poisson_ratio=0.9");
   for (const char* size : {"1e15", "1e300"}) {
     expect_scene_error(2, "/receiver", fmt::format("receiver.size=[{0},{0}]", size));

@@ -237,6 +237,25 @@ TEST(Gltf, QuantizedPositionsAreDecodedInAllForms) {
     }
 }
 
+TEST(Gltf, TextureCoordinatesMayBeIntegers) {
+  std::string positions(36, '\0');
+  for (const std::size_t corner : {1, 2}) positions.replace(16 * corner, 4, std::string("\0\0\x80\x3f", 4));
+  for (const auto& [type, places] :  // (0, 1), (1, 0), (0, 0) from the upper left corner.
+       {std::pair("5121", std::string("\0\xff\0\0\xff\0\0\0\0\0\0\0", 12)),
+        {"5123", std::string("\0\0\xff\xff\xff\xff\0\0\0\0\0\0", 12)}}) {
+    const Temporary file("a.gltf", R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [
+      {"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}}]}], "buffers": [{"uri":
+      "data:;base64,)" + base64(positions + places) +
+                                       R"(", "byteLength": 48}], "bufferViews": [
+      {"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 12, "byteStride": 4}], "accessors":
+      [{"bufferView": 0, "count": 3, "type": "VEC3", "componentType": 5126, "min": [0, 0, 0], "max": [0, 1, 1]},
+      {"bufferView": 1, "count": 3, "type": "VEC2", "normalized": true, "componentType": )" +
+                                       type + "}]}");
+    EXPECT_EQ(read_mesh_with_normals(file.path(), {}).places, (std::vector<Eigen::Vector2f>{{0, 0}, {1, 1}, {0, 1}}))
+        << type;
+  }
+}
+
 TEST(Gltf, ExtensionsThatChangeTheShapeAreRefusedByName) {
   const Quantized kind{5122, 2, 32767};
   const std::string uri = "\"uri\": \"data:;base64," + base64(triangle_numbers(kind)) + "\", ";

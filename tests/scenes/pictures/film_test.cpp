@@ -154,5 +154,61 @@ TEST_F(FilmScene, TheLightsEdgeHasNoSeam) {
   expect_near(with, without, 2e-3);
 }
 
+/// The same for a sun with a disk, on meshes anywhere, and low over a plate.
+TEST_F(FilmScene, TheDisksLightHasNoSeam) {
+  write_quad("\"smooth_angle\": 0");
+  write("quad.obj",
+        "v -4 -4 -1.3\nv 0 -4 -1.3\nv 0 4 -1.3\nv -4 4 -1.3\nv 0 -4 -5\nv 4 -4 -5\nv 4 4 -5\nv 0 4 -5\n"
+        "f 1 2 3 4\nf 5 6 7 8\n");
+  const std::string mesh = R"(objects=[{"file":"quad.obj","material":{"kind":"diffuse"}}])",
+                    plate = R"(objects=[{"plate":{"center":[0,0,-2],"size":[8,8]},"material":{"kind":"diffuse"}}])";
+  for (const auto& [object, direction] : {std::pair(mesh, "[0,0,-1]"), {plate, "[0,0,-1]"}, {plate, "[1,0,-0.1]"}}) {
+    const Settings sun{object,
+                       "camera.height=6",
+                       std::string("lights.0.direction=") + direction,
+                       "lights.0.angle=20",
+                       "integrator.max_samples=64",
+                       "integrator.min_samples=64",
+                       "integrator.noise=0"};
+    const Image without = render(sun);
+    Settings weak = sun;
+    weak.insert(weak.end(), {"bending.a=0.75", "field.scale=1e-7"});
+    const Image with = render(weak);
+    EXPECT_NEAR(mean(with, "G"), mean(without, "G"), 0.02 * mean(without, "G")) << object << direction;
+  }
+}
+
+TEST_F(FilmScene, GroupsAtTheLightsEdgeAreFinite) {
+  write_quad("\"smooth_angle\": 0");
+  render({R"(objects=[{"plate":{"center":[0,0,-2],"size":[8,8]},"material":{"kind":"diffuse"}}])",
+          R"(lights=[{"kind":"directional","direction":[0.3,0.2,-1],"angle":0.53,"group":"sun"},
+                     {"kind":"constant","strength":0.0005,"group":"sky"}])",
+          "camera.height=5", "bending.a=0.75", "field.scale=1e-7"});
+}
+
+TEST_F(FilmScene, TextureCoordinatesOnlyMatterToPictures) {
+  write_picture("colors.png", [](int, int) { return Vector3d(0, 0, 1); });
+  const std::string quad = "v -1 -1 -2\nv 1 -1 -2\nv 1 1 -2\nv -1 1 -2\n", places = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+  for (const std::string& rest :
+       std::vector<std::string>{"vt nan nan\nf 1/1 2/1 3/1 4/1\n", "f 1/0 2/0 3/0 4/0\n", "f -4/-4 -3/-3 -2/-2 -1/-1\n",
+                                places + "f 1/1 2/2 3/3 4/9\n", places + "f 1/1 2/2 3/3 4/0\n"}) {
+    write_quad("\"smooth_angle\": 0");
+    write("quad.obj", quad + rest);
+    EXPECT_GT(mean(render({}), "G"), 0.01) << rest;
+    expect_error(1, "quad.obj: .*texture coordinate.*unwrap it", {"objects.0.texture=colors.png"});
+  }
+}
+
+TEST_F(FilmScene, WhatIsToldHasTheAxesOfTheFile) {
+  write("scene.json", R"({"world": {"up": "y"}, "field": {"generate": {"kind": "vortex", "resolution": 9}},
+    "light": {"direction": "auto"}, "receiver": {"resolution": [8, 8]}, "output": {"image": "a.png", "exr_type": "half"},
+    "integrator": {"type": "polariscope"}})");
+  render_all({});
+  EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("light: along [0, -1, 0]")));
+  EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("`/output/exr_type` has no effect")));
+  const Render stretch = render_all({"integrator.type=stretch", "light.direction=[0,-1,0]"});
+  EXPECT_EQ(stretch.metadata.at("tensorray:direction"), "0 -1 0");
+}
+
 }  // namespace
 }  // namespace tensorray

@@ -472,11 +472,5 @@ int main(int argc, char** argv) {
   tensorray::Progress& progress = tensorray::progress_until_interrupted();
   CLI::App app("Make a tensor field of another program's file", "tensorray import");
   tensorray::add_import_options(app, progress);
-  return tensorray::run_and_report([&] {
-    try {
-      app.parse(argc, argv);
-    } catch (const CLI::Success& request) {  // --help
-      app.exit(request);
-    }
-  });
+  return tensorray::run_and_report([&] { tensorray::parse(app, argc, argv); });
 }

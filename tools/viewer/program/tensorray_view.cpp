@@ -130,12 +130,6 @@ int main(int argc, char** argv) {
   add_field_options(app, options.import, options.viewed.overrides);
   app.add_flag("-q,--quiet", options.quiet, "Print only the address");
   return run_and_report([&] {
-    try {
-      app.parse(argc, argv);
-    } catch (const CLI::Success& request) {  // --help
-      app.exit(request);
-      return;
-    }
-    view(options, progress);
+    if (parse(app, argc, argv)) view(options, progress);
   });
 }

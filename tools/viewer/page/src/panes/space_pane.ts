@@ -8,7 +8,8 @@ import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeome
 import { axis_colors, style_value } from "../elements/dom";
 import type { FieldInformation, Mesh, Ray, Space, Vector } from "../state/protocol";
 
-const view_from: Vector = [0.9, -1.5, 0.75];
+const view_from: Vector = [0.9, -1.5, 0.75];  // where z is up
+const view_from_y_up: Vector = [0.9, 0.75, 1.5];
 const margin = 0.08;  // of the pane, about the content
 const click_distance = 4;  // pixels
 
@@ -21,7 +22,7 @@ export class SpacePane {
   private readonly renderer: three.WebGLRenderer;
   private readonly scene = new three.Scene();
   private readonly camera = new three.PerspectiveCamera(35, 1, 0.01, 100);
-  private readonly controls: OrbitControls;
+  private controls: OrbitControls;
   private readonly field_group = new three.Group();
   private readonly space_group = new three.Group();
   private readonly look_group = new three.Group();
@@ -56,13 +57,7 @@ export class SpacePane {
     this.scene.add(this.camera, new three.AmbientLight("#ffffff", 1.2));
     this.scene.add(this.field_group, this.space_group, this.look_group);
 
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.listenToKeyEvents(canvas);
-    this.controls.addEventListener("start", () => (this.turned = true));
-    this.controls.addEventListener("change", () => {
-      this.tell_view();
-      this.request();
-    });
+    this.controls = this.new_controls();
     this.listen_for_clicks(canvas);
     canvas.addEventListener("keydown", (event) => {
       const factor = { "+": 0.87, "=": 0.87, "-": 1.15 }[event.key];
@@ -74,14 +69,32 @@ export class SpacePane {
     new ResizeObserver(() => this.resize()).observe(frame);
   }
 
+  /** They keep the camera's up of this moment. */
+  private new_controls(): OrbitControls {
+    const controls = new OrbitControls(this.camera, this.renderer.domElement);
+    controls.listenToKeyEvents(this.renderer.domElement);
+    controls.addEventListener("start", () => (this.turned = true));
+    controls.addEventListener("change", () => {
+      this.tell_view();
+      this.request();
+    });
+    return controls;
+  }
+
   show_field(field: FieldInformation): void {
+    const tilts = field.y_up !== this.camera.up.y > 0;
+    if (tilts) {
+      this.camera.up.set(0, field.y_up ? 1 : 0, field.y_up ? 0 : 1);
+      this.controls.dispose();
+      this.controls = this.new_controls();
+    }
     const first = this.field === null;
     this.field = field;
     this.field_sphere = new three.Box3()
       .setFromPoints(field.corners.map((corner) => new three.Vector3(...corner)))
       .getBoundingSphere(new three.Sphere());
     this.build_field();
-    if (first) this.reset_view();
+    if (first || tilts) this.reset_view();
     this.request();
   }
 
@@ -129,7 +142,7 @@ export class SpacePane {
     const points = this.points();
     if (points.length === 0) return;
     const center = new three.Box3().setFromPoints(points).getCenter(new three.Vector3());
-    const toward = new three.Vector3(...view_from).normalize();
+    const toward = new three.Vector3(...(this.camera.up.y > 0 ? view_from_y_up : view_from)).normalize();
     const right = this.camera.up.clone().cross(toward).normalize();
     const up = toward.clone().cross(right);
     const half_height = Math.tan((this.camera.fov * Math.PI) / 360) * (1 - margin);

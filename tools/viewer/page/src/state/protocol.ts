@@ -16,6 +16,8 @@ export interface FieldInformation {
   voxels: Vector;
   /** World; bit 0 of the index is x, bit 1 is y, bit 2 is z. */
   corners: Vector[];
+  /** Else z is up. */
+  y_up: boolean;
 }
 
 export interface Hello {
