@@ -86,8 +86,7 @@ void load_pictures(const ObjectDescription& description, const ColorManagement& 
                              "unwrap it, and write it as .obj, .gltf, .glb, .dae or .fbx");
   for (const Eigen::Vector2f& place : surface.places)
     if (!place.allFinite())
-      throw std::runtime_error(description.file.string() +
-                               ": a texture coordinate is not finite, or is not there; unwrap it again");
+      throw std::runtime_error(description.file.string() + ": a texture coordinate is not there; unwrap it again");
   surface.pictures = std::make_shared<MeshPictures>(std::move(pictures));
 }
 

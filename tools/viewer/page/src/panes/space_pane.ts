@@ -8,8 +8,7 @@ import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeome
 import { axis_colors, style_value } from "../elements/dom";
 import type { FieldInformation, Mesh, Ray, Space, Vector } from "../state/protocol";
 
-const view_from: Vector = [0.9, -1.5, 0.75];  // where z is up
-const view_from_y_up: Vector = [0.9, 0.75, 1.5];
+const view_from: Record<"y" | "z", Vector> = { y: [0.9, 0.75, 1.5], z: [0.9, -1.5, 0.75] };  // by the axis that is up
 const margin = 0.08;  // of the pane, about the content
 const click_distance = 4;  // pixels
 
@@ -142,7 +141,7 @@ export class SpacePane {
     const points = this.points();
     if (points.length === 0) return;
     const center = new three.Box3().setFromPoints(points).getCenter(new three.Vector3());
-    const toward = new three.Vector3(...(this.camera.up.y > 0 ? view_from_y_up : view_from)).normalize();
+    const toward = new three.Vector3(...view_from[this.camera.up.y > 0 ? "y" : "z"]).normalize();
     const right = this.camera.up.clone().cross(toward).normalize();
     const up = toward.clone().cross(right);
     const half_height = Math.tan((this.camera.fov * Math.PI) / 360) * (1 - margin);
