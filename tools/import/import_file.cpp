@@ -139,8 +139,9 @@ bool wants_levels(const ImportSettings& settings) {
 }
 
 TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings, ImportReport& report) {
-  if (wants_levels(settings))
-    throw std::invalid_argument("has voxels of one size, which are kept: leave --levels, --finest and --error out");
+  if (wants_levels(settings) || settings.sampling.rounding > 0)
+    throw std::invalid_argument(
+        "has voxels of one size, which are kept: leave --levels, --finest, --error and --rounding out");
   if (!settings.boundary.empty()) throw std::invalid_argument("has voxels, which have no body: leave --boundary out");
   if (settings.take == Take::tensor && !settings.array.empty() && lattice.array.empty())
     throw std::invalid_argument("has one array, which has no name: leave --array out");

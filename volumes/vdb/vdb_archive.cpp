@@ -243,6 +243,10 @@ class Reader : private openvdb::io::Archive {
 
 class Writer : private openvdb::io::Archive {
  public:
+  explicit Writer(bool zip) {
+    if (zip) setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
+  }
+
   void write_file(std::fstream& file, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
     auto stream_metadata = std::make_shared<openvdb::io::StreamMetadata>();
     openvdb::io::setStreamMetadataPtr(file, stream_metadata, /*transfer=*/false);
@@ -352,7 +356,8 @@ VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>&
 
 void fail_damaged_voxels(const std::filesystem::path& path) { fail_damaged(path, ""); }
 
-void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
+void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata,
+               bool zip) {
   openvdb::initialize();
   std::vector<char> buffer(stream_buffer);
   std::fstream file;
@@ -361,7 +366,7 @@ void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& gri
   try {
     file.exceptions(any_failure);
     file.open(path, std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
-    Writer().write_file(file, grids, metadata);
+    Writer(zip).write_file(file, grids, metadata);
     file.close();
   } catch (const std::ios_base::failure&) {
     fail(path, "cannot be written: " + (errno ? std::generic_category().message(errno) : "the write failed"));

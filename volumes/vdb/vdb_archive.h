@@ -70,7 +70,9 @@ std::bitset<TensorBlock::voxels> voxel_mask(const Leaf& leaf) {
 /// is called once for each, and is the only one of their functions that needs voxels' values. Equal grids give equal
 /// bytes: the file's unique tag, which OpenVDB draws at random, is replaced by a hash of the contents.
 /// @throw std::runtime_error naming the file and the reason, also when the disk is full.
-void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata);
+/// @param zip  Compress with zlib instead: slower, and smaller where values have few different bytes.
+void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata,
+               bool zip = false);
 
 // Where the voxels of a grid are. OpenVDB refuses transforms whose determinant is below 3e-15, such as voxels of ten
 // micrometres in metres. Grids with smaller voxels are stored in a smaller unit of length, which their metadata have as

@@ -167,6 +167,44 @@ TEST(MeshLevels, TheCoarsestAndTheFinestAreChosenOrGiven) {
   EXPECT_NEAR(sampled_with_levels(*even, {}).report.voxel.x(), 1.0 / 16, 1e-9);
 }
 
+TEST(MeshLevels, AWeakLayerCountsBesideAStrongOne) {
+  const auto both = [](const Vector3d& p) { return 1000 * std::exp(-p.x() / 0.05) + std::exp(-p.y() / 0.05); };
+  const Grid mesh = mesh_of(
+      VTK_HEXAHEDRON, 16,
+      [](const Vector3d& p) {
+        return Vector3d(graded(p).x(), graded({p.y(), 0, 0}).x(), p.z());
+      },
+      both);
+  const Sampled result = sampled_with_levels(*mesh, voxels_of(1.0 / 32));
+  ASSERT_FALSE(result.grid.finer.empty());
+  bool is_refined = false;  // Where only the weak layer is, of less than a thousandth of the peak.
+  for_each_voxel(result.level(1),
+                 [&](const Vector3d& p, const Matrix3d&) { is_refined |= p.x() > 0.8 && p.y() < 0.1; });
+  EXPECT_TRUE(is_refined);
+}
+
+TEST(MeshLevels, RoundingIsOfTheMedianAndDoublesWithEachLevel) {
+  const Grid mesh = mesh_of(VTK_HEXAHEDRON, 16, graded, thin_layer);
+  const Sampled exact = sampled_with_levels(*mesh, voxels_of(1.0 / 16));
+  SamplingSettings settings = voxels_of(1.0 / 16);
+  settings.rounding = 0.1;
+  const Sampled rounded = sampled_with_levels(*mesh, settings);
+  ASSERT_FALSE(rounded.grid.finer.empty());
+  const auto quantum =
+      static_cast<float>(std::exp2(std::floor(std::log2(settings.rounding * exact.report.native_median))));
+  for (std::size_t level = 0; level <= rounded.grid.finer.size(); ++level) {
+    const TensorGrid before = exact.level(level), after = rounded.level(level);
+    ASSERT_EQ(before.blocks.size(), after.blocks.size());
+    const float step = std::ldexp(quantum, static_cast<int>(level));
+    for (std::size_t i = 0; i < after.blocks.size(); ++i)
+      for (std::size_t k = 0; k < TensorBlock::voxels; ++k) {
+        const float value = after.blocks[i].values[k](0, 0);
+        ASSERT_EQ(value, step * std::round(value / step));
+        ASSERT_LE(std::abs(value - before.blocks[i].values[k](0, 0)), 0.5001f * step);
+      }
+  }
+}
+
 TEST(MeshLevels, AreTheSameOnAnyNumberOfThreads) {
   const Grid mesh = mesh_of(VTK_TETRA, 10, graded, thin_layer);
   std::vector<TensorGrid> grids;

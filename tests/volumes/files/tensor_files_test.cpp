@@ -33,6 +33,29 @@ TEST(TensorFiles, HalfRoundTripErrsByHalfsPrecision) {
   EXPECT_EQ(list_vdb(full)[0].storage, "full");
 }
 
+TEST(TensorFiles, ZipIsSmallerWhereValuesAreRounded) {
+  TensorGrid grid = sparse_grid();
+  for (TensorBlock& block : grid.blocks) {
+    block.active.set();
+    for (int i = 0; i < TensorBlock::voxels; ++i)
+      block.values[i] = Eigen::Matrix3f::Constant(0.125f * static_cast<float>(i * i % 13));
+  }
+  for (const bool half : {false, true}) {
+    const Temporary usual("a.vdb"), path("b.vdb");
+    write_tensor_vdb(usual, grid, half);
+    write_tensor_vdb(path, grid, half, true);
+    EXPECT_LT(fs::file_size(path), fs::file_size(usual));
+    const TensorGrid read = read_tensor_vdb(path);
+    ASSERT_EQ(read.blocks.size(), grid.blocks.size());
+    for (std::size_t i = 0; i < read.blocks.size(); ++i) EXPECT_TRUE(read.blocks[i].values == grid.blocks[i].values);
+    openvdb::io::File file(path.string());
+    file.open();
+    const auto row = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file.readGrid(grid.name + "_row0"));
+    const Eigen::Vector3i at = grid.blocks[0].origin + TensorBlock::position(5);
+    EXPECT_EQ(row->tree().getValue(openvdb::Coord(at.x(), at.y(), at.z())), openvdb::Vec3s(1.5f));
+  }
+}
+
 TEST(TensorFiles, HalfRefusesGreatValues) {
   TensorGrid grid = sparse_grid();
   grid.blocks[1].values[1](2, 0) = -70000;

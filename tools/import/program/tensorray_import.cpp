@@ -50,7 +50,7 @@ constexpr double max_negative = 0.2;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, viscous_stress_of, order, frame, cells = "linear", error;
+  std::string array, gradient_of, strain_of, viscous_stress_of, order, frame, cells = "linear", error, rounding;
   std::vector<int> resolution;
   std::vector<double> voxel_size, bounds, origin;
   double thickness = 0, finest = 0;
@@ -70,12 +70,12 @@ std::optional<Value> named(const std::string& name, const std::vector<std::pair<
 }
 
 /// A part as 1% or 0.01. @throw std::invalid_argument
-double part_of(const std::string& text) {
+double part_of(const std::string& text, const std::string& option) {
   double value = 0;
   const bool is_percent = !text.empty() && text.back() == '%';
   if (!CLI::detail::lexical_cast(is_percent ? text.substr(0, text.size() - 1) : text, value) || !(value >= 0) ||
       !(value *= is_percent ? 0.01 : 1.0, value <= 1))
-    throw std::invalid_argument("--error " + escaped(text) + ": give a part of the peak, as 1% or 0.01");
+    throw std::invalid_argument(option + " " + escaped(text) + ": give a part of the norm, as 1% or 0.01");
   return value;
 }
 
@@ -94,7 +94,8 @@ ImportSettings settings_of(const ImportOptions& options) {
   if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
   if (options.levels > 0) settings.sampling.levels = options.levels;
   if (options.finest > 0) settings.sampling.finest = options.finest;
-  if (!options.error.empty()) settings.sampling.error = part_of(options.error);
+  if (!options.error.empty()) settings.sampling.error = part_of(options.error, "--error");
+  if (!options.rounding.empty()) settings.sampling.rounding = part_of(options.rounding, "--rounding");
   if (options.finest > 0 && options.voxel_size.size() == 1 && options.finest > options.voxel_size[0])
     throw std::invalid_argument("--finest must not be larger than --voxel-size, which is the coarsest");
   if (options.thickness > 0) settings.thickness = options.thickness;
@@ -153,8 +154,8 @@ void print_levels(const SamplingReport& mesh, std::size_t blocks, bool is_symmet
   const double floats = CubicBrick::stored_floats(is_symmetric ? TensorBrick::symmetric : TensorBrick::general);
   if (!mesh.finer.empty())
     tell_made(
-        fmt::format("  refined where voxels differ from the mesh by more than {:.3g}% of its peak (--error); {} "
-                    "in memory",
+        fmt::format("  refined where voxels differ from the mesh by more than {:.3g}% of its norm and the median one "
+                    "(--error); {} in memory",
                     100 * mesh.wanted_error, bytes_text(static_cast<double>(blocks) * floats * sizeof(float))));
   if (mesh.is_too_large)
     tell_made("  the next level is left out, as it would have too many voxels; --voxel-size or --finest lets it be");
@@ -200,7 +201,9 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
   std::size_t blocks = 0;
   for (const TensorBlocks* level : levels_of(grid)) blocks += level->size();
   const Eigen::Vector3i size = grid.active_box().sizes() + Eigen::Vector3i::Ones();
-  output.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, grid, options.half); });
+  output.write([&](const std::filesystem::path& path) {
+    write_tensor_vdb(path, grid, options.half, settings.sampling.rounding > 0);
+  });
   bar.reset();
   tell_made(fmt::format("{}: field \"{}\", {} x {} x {} voxels, {}", options.output.string(), escaped(name), size.x(),
                         size.y(), size.z(),
@@ -386,8 +389,13 @@ void add_where(CLI::App& command, ImportOptions& options) {
       ->excludes(resolution);
   command
       .add_option("--error", options.error,
-                  "Refine where voxels differ from the mesh by more than this part of its peak, as 1%; 0: wherever "
-                  "cells are smaller than voxels")
+                  "Refine where voxels differ from the mesh by more than this part of the tensor's norm and the median "
+                  "one, as 10%; 0: wherever cells are smaller than voxels")
+      ->option_text("PART");
+  command
+      .add_option("--rounding", options.rounding,
+                  "Round components to this part of the median norm at most, as 1%, and twice that at each level, and "
+                  "compress the file more: with --half it is a third as large")
       ->option_text("PART");
   command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6);
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <vtkCellData.h>
 #include <vtkDataSet.h>
 #include <vtkIntArray.h>
@@ -29,7 +30,7 @@ using Eigen::Vector3d;
 
 constexpr double face_tolerance = 1e-6;  ///< As a fraction of the mesh's diagonal.
 
-constexpr double default_error = 0.01;
+constexpr double default_error = 0.1;
 
 /// There may be as many as voxels.
 using Norms = std::vector<double, PageAllocator<double>>;
@@ -144,8 +145,7 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
       return;
     const MeshSource source = on_lattice(coarsest, lattice);
     const TensorBlocks& blocks = level == 1 ? grid.blocks : grid.finer.back();
-    const double tolerance = error > 0 ? error * report.native_peak * std::pow(2, level - 1) : -1;
-    const auto missed = missed_cells({source, places, blocks}, sizes, tolerance);
+    const auto missed = missed_cells({source, places, blocks, level - 1}, sizes, {error, report.native_median});
     const std::vector<bool> refined = bricks_to_refine(lattice, places, missed);
     const auto count = static_cast<std::size_t>(std::count(refined.begin(), refined.end(), true));
     if (count == 0) return;
@@ -165,6 +165,19 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
     of_level.voxel = lattice.voxel.minCoeff();
     of_level.bricks = count;
     for (const TensorBlock& block : grid.finer.back()) of_level.active += block.active.count();
+  }
+}
+
+/// Rounds components to multiples of a power of two, which is twice as large at each level, so that a file has few
+/// different bytes. Light crosses the voxels of a finer level in half of the time.
+void round_values(TensorGrid& grid, double largest) {
+  if (!(largest > 0)) return;
+  auto quantum = static_cast<float>(std::exp2(std::floor(std::log2(largest))));
+  for (TensorBlocks* const blocks : levels_of(grid)) {
+    tbb::parallel_for(std::size_t{0}, blocks->size(), [&](std::size_t i) {
+      for (Eigen::Matrix3f& value : (*blocks)[i].values) value = quantum * (value / quantum).array().round().matrix();
+    });
+    quantum *= 2;
   }
 }
 
@@ -189,6 +202,7 @@ TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const
   report.voxel = lattice.voxel;
   report_native(source, sampled_box(solid, settings), report);
   add_finer_levels(source, settings, progress, grid, report);
+  round_values(grid, settings.rounding * report.native_median);
   report_sampled(grid, report);
   if (report.active == 0)
     throw std::invalid_argument(
