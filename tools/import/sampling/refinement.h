@@ -14,8 +14,8 @@ namespace tensorray {
 /// which few may be slivers), or of each cell if tensors are at cells alone. 0 where there are none.
 std::vector<float> cell_sizes(const MeshSource& source);
 
-/// What errors are parts of: the norm of the tensor, as light is scattered anyway where tensors are large, and the mesh's
-/// median norm, twice that at each level, as light crosses its voxels in half of the time.
+/// What errors are parts of: the norm of the tensor, as light is scattered anyway where tensors are large, and the
+/// mesh's median norm, twice that at each level, as light crosses its voxels in half of the time.
 inline double local_scale(double norm, double median, int level) { return norm + std::ldexp(median, level); }
 
 /// A level that has been sampled.
