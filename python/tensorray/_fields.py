@@ -187,7 +187,7 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
     voxel_size   Edge of a voxel, of the coarsest level, world units; of .npy also three, along x, y and z.
     levels       At most so many sizes of voxels, each half of the one before, as the mesh's cells ask: 1 to 4 (4).
     finest       The least edge of a voxel; without voxel_size, the levels are counted from it.
-    error        Refine where voxels differ from the mesh by more than this part of its norm and the median: "10%".
+    error        Refine where voxels differ from the mesh by more than this part of its peak: 0.01, "1%".
     origin       World (x, y, z) of the centre of the first voxel of a .npy file; default: (0, 0, 0).
     bounds       Crop: (xmin, xmax, ymin, ymax, zmin, zmax).
     mask         A file of voxels with one number each: where it is 0, or does not reach, there is no tensor.

@@ -167,22 +167,6 @@ TEST(MeshLevels, TheCoarsestAndTheFinestAreChosenOrGiven) {
   EXPECT_NEAR(sampled_with_levels(*even, {}).report.voxel.x(), 1.0 / 16, 1e-9);
 }
 
-TEST(MeshLevels, AWeakLayerCountsBesideAStrongOne) {
-  const auto both = [](const Vector3d& p) { return 1000 * std::exp(-p.x() / 0.05) + std::exp(-p.y() / 0.05); };
-  const Grid mesh = mesh_of(
-      VTK_HEXAHEDRON, 16,
-      [](const Vector3d& p) {
-        return Vector3d(graded(p).x(), graded({p.y(), 0, 0}).x(), p.z());
-      },
-      both);
-  const Sampled result = sampled_with_levels(*mesh, voxels_of(1.0 / 32));
-  ASSERT_FALSE(result.grid.finer.empty());
-  bool is_refined = false;  // Where only the weak layer is, of less than a thousandth of the peak.
-  for_each_voxel(result.level(1),
-                 [&](const Vector3d& p, const Matrix3d&) { is_refined |= p.x() > 0.8 && p.y() < 0.1; });
-  EXPECT_TRUE(is_refined);
-}
-
 TEST(MeshLevels, RoundingIsOfTheMedianAndDoublesWithEachLevel) {
   const Grid mesh = mesh_of(VTK_HEXAHEDRON, 16, graded, thin_layer);
   const Sampled exact = sampled_with_levels(*mesh, voxels_of(1.0 / 16));

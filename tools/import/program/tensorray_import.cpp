@@ -154,8 +154,8 @@ void print_levels(const SamplingReport& mesh, std::size_t blocks, bool is_symmet
   const double floats = CubicBrick::stored_floats(is_symmetric ? TensorBrick::symmetric : TensorBrick::general);
   if (!mesh.finer.empty())
     tell_made(
-        fmt::format("  refined where voxels differ from the mesh by more than {:.3g}% of its norm and the median one "
-                    "(--error); {} in memory",
+        fmt::format("  refined where voxels differ from the mesh by more than {:.3g}% of its peak (--error); {} "
+                    "in memory",
                     100 * mesh.wanted_error, bytes_text(static_cast<double>(blocks) * floats * sizeof(float))));
   if (mesh.is_too_large)
     tell_made("  the next level is left out, as it would have too many voxels; --voxel-size or --finest lets it be");
@@ -389,8 +389,8 @@ void add_where(CLI::App& command, ImportOptions& options) {
       ->excludes(resolution);
   command
       .add_option("--error", options.error,
-                  "Refine where voxels differ from the mesh by more than this part of the tensor's norm and the median "
-                  "one, as 10%; 0: wherever cells are smaller than voxels")
+                  "Refine where voxels differ from the mesh by more than this part of its peak, as 1%; 0: wherever "
+                  "cells are smaller than voxels")
       ->option_text("PART");
   command
       .add_option("--rounding", options.rounding,

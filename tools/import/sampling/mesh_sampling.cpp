@@ -30,7 +30,7 @@ using Eigen::Vector3d;
 
 constexpr double face_tolerance = 1e-6;  ///< As a fraction of the mesh's diagonal.
 
-constexpr double default_error = 0.1;
+constexpr double default_error = 0.01;
 
 /// There may be as many as voxels.
 using Norms = std::vector<double, PageAllocator<double>>;
@@ -145,7 +145,8 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
       return;
     const MeshSource source = on_lattice(coarsest, lattice);
     const TensorBlocks& blocks = level == 1 ? grid.blocks : grid.finer.back();
-    const auto missed = missed_cells({source, places, blocks, level - 1}, sizes, {error, report.native_median});
+    const double tolerance = error > 0 ? error * report.native_peak * std::pow(2, level - 1) : -1;
+    const auto missed = missed_cells({source, places, blocks}, sizes, tolerance);
     const std::vector<bool> refined = bricks_to_refine(lattice, places, missed);
     const auto count = static_cast<std::size_t>(std::count(refined.begin(), refined.end(), true));
     if (count == 0) return;

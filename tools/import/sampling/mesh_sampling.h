@@ -24,7 +24,7 @@ struct SamplingSettings {
   std::variant<std::monostate, int, Eigen::Vector3i, double> resolution;
   std::optional<int> levels;     ///< At most so many, 1 to max_levels; none: max_levels.
   std::optional<double> finest;  ///< The least edge of a voxel; none: that of the last level.
-  std::optional<double> error;   ///< A part of local_scale (refinement.h), from which on bricks are refined.
+  std::optional<double> error;   ///< Of ‖T‖, as a part of the mesh's peak, from which on bricks are refined.
   double rounding = 0;  ///< Of components, to this part of the mesh's median ‖T‖ at most; of levels, twice that each.
   std::optional<Eigen::AlignedBox3d> bounds;  ///< World; default: bounds of the three-dimensional cells.
   double thickness =

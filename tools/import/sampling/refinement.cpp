@@ -119,7 +119,7 @@ class LevelVoxels {
 };
 
 /// Whether voxels are too coarse at a point of the mesh, or in a cell if tensors are at cells alone.
-std::vector<char> find_misses(const SampledLevel& level, const std::vector<float>& sizes, const Tolerance& tolerance) {
+std::vector<char> find_misses(const SampledLevel& level, const std::vector<float>& sizes, double tolerance) {
   const MeshSource& source = level.source;
   const LevelVoxels voxels(level);
   const double voxel = source.lattice.voxel.maxCoeff();
@@ -138,8 +138,7 @@ std::vector<char> find_misses(const SampledLevel& level, const std::vector<float
         x = source.solid.boxes[i].center();
       const Eigen::Map<const Value> value(tensors + 9 * id);
       if (!box.contains(x) || !value.allFinite()) continue;
-      misses[i] = tolerance.part == 0 ||
-                  voxels.error(x, value) > tolerance.part * local_scale(value.norm(), tolerance.median, level.level);
+      misses[i] = tolerance < 0 || voxels.error(x, value) > tolerance;
     }
   });
   return misses;
@@ -170,7 +169,7 @@ std::vector<float> cell_sizes(const MeshSource& source) {
 }
 
 std::vector<Eigen::AlignedBox3d> missed_cells(const SampledLevel& level, const std::vector<float>& sizes,
-                                              const Tolerance& tolerance) {
+                                              double tolerance) {
   const MeshSource& source = level.source;
   const std::vector<char> misses = find_misses(level, sizes, tolerance);
   const auto is_missed = [&](vtkIdType i) { return misses[static_cast<std::size_t>(i)] != 0; };

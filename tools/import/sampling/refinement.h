@@ -2,7 +2,6 @@
 /// @file tools/import/sampling/refinement.h
 /// Where a level becomes finer: in bricks with cells that are smaller than its voxels, where it misses the mesh.
 
-#include <cmath>
 #include <vector>
 
 #include "tools/import/sampling/block_places.h"
@@ -14,31 +13,20 @@ namespace tensorray {
 /// which few may be slivers), or of each cell if tensors are at cells alone. 0 where there are none.
 std::vector<float> cell_sizes(const MeshSource& source);
 
-/// What errors are parts of: the norm of the tensor, as light is scattered anyway where tensors are large, and the mesh's
-/// median norm, twice that at each level, as light crosses its voxels in half of the time.
-inline double local_scale(double norm, double median, int level) { return norm + std::ldexp(median, level); }
-
 /// A level that has been sampled.
 struct SampledLevel {
   const MeshSource& source;  ///< With its lattice.
   const BlockPlaces& places;
   const TensorBlocks& blocks;
-  int level;
-};
-
-/// How far a level may be from the mesh at a tensor: by a part of its local_scale.
-struct Tolerance {
-  double part;  ///< 0: by nothing.
-  double median;
 };
 
 /// The boxes of the cells that a level misses: one of their points (or they, if tensors are at cells alone) is where
 /// cells are smaller than voxels by more than rounding to a power of two, and where the voxels give a tensor that
-/// differs from the mesh's by more than `tolerance` (Frobenius). Between voxels that is cubic
+/// differs from the mesh's by more than `tolerance` (Frobenius; < 0: by anything). Between voxels that is cubic
 /// interpolation; where some of its 4³ voxels are not active, a linear function fitted to the others, so that linear
 /// fields need no finer voxels up to a body's surface. Uses all threads; the result does not depend on their number.
 std::vector<Eigen::AlignedBox3d> missed_cells(const SampledLevel& level, const std::vector<float>& sizes,
-                                              const Tolerance& tolerance);
+                                              double tolerance);
 
 /// Of each block of a level, by its number, whether its brick is to be refined: a cell that the level misses is in it,
 /// or up to two voxels beside it.
