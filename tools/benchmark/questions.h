@@ -5,9 +5,9 @@
 
 namespace tensorray::bench {
 
-void add_rays();     ///< Is `trace` faster than a loop on OpenVDB's sampler?
+void add_rays();         ///< Is `trace` faster than a loop on OpenVDB's sampler?
 void add_polariscope();  ///< How long does polarised light take, beside the samples of the field alone?
-void add_renders();  ///< How long do whole renders take, and how exact are they? (renders.json)
-void add_view();     ///< How soon does the live view show a change?
+void add_renders();      ///< How long do whole renders take, and how exact are they? (renders.json)
+void add_view();         ///< How soon does the live view show a change?
 
 }  // namespace tensorray::bench
