@@ -206,6 +206,8 @@ TEST_F(FilmScene, WhatIsToldHasTheAxesOfTheFile) {
   render_all({});
   EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("light: along [0, -1, 0]")));
   EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("`/output/exr_type` has no effect")));
+  render_all({}, {"maps.nrrd"});
+  EXPECT_THAT(read_file(in_folder("maps.nrrd")), ::testing::HasSubstr("(0,2,0)"));
   const Render stretch = render_all({"integrator.type=stretch", "light.direction=[0,-1,0]"});
   EXPECT_EQ(stretch.metadata.at("tensorray:direction"), "0 -1 0");
 }
