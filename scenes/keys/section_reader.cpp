@@ -41,6 +41,8 @@ std::string quoted_list(const std::vector<std::string>& names, const char* separ
 /// "did you mean `light`?"; if no known key is similar to `key`, what it is here, or the list of known keys.
 /// @param pointer  Of the section; places within deeper ones are not the camera's.
 std::string suggestion(const std::string& key, const std::string& pointer, const std::set<std::string>& known) {
+  const std::string here = name_here(key);
+  if (here == "camera.position" && known.count("position") > 0) return "did you mean `position`?";
   constexpr std::size_t longest = 64;  // All keys are shorter. edit_distance takes quadratic time.
   std::string nearest;
   std::size_t least = key.size() > longest ? 0 : std::max<std::size_t>(2, key.size() / 2);
@@ -52,7 +54,6 @@ std::string suggestion(const std::string& key, const std::string& pointer, const
     least = distance;
   }
   if (!nearest.empty()) return fmt::format("did you mean `{}`?", nearest);
-  const std::string here = name_here(key);
   const bool is_elsewhere = starts_with(here, "camera.") && pointer.find('/', 1) != std::string::npos;
   if (!here.empty() && !is_elsewhere) return "here it is " + here;
   return "known keys are " + quoted_list({known.begin(), known.end()}, ", ");
