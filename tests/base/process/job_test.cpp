@@ -1,8 +1,10 @@
 #include "base/process/job.h"
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstring>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -164,6 +166,7 @@ TEST(JobTest, ResultsAreFoundOrMade) {
         &job, "values",
         [&] {
           values.assign(3, 7);
+          std::this_thread::sleep_for(std::chrono::milliseconds(1));  // Worth a thousand bytes.
           ++made;
         },
         [&](Archive& archive) { archive.copy_list(values); });
