@@ -252,7 +252,7 @@ void PathTracingMethod::check(SceneDescription& scene, const Json& json, const S
   if (scene.bending.settings.max_steps > 1'000'000)
     source.fail("`/bending/max_steps` must be at most 1e6 with path_tracing, which keeps every step of a path");
   check_memory(scene.camera.resolution.cast<double>().prod() *
-                   (300.0 + (scene.output.wants("spectral") ? 24.0 * paths.bands : 0)),
+                   (280.0 + (scene.output.wants("spectral") ? 24.0 * paths.bands : 0)),
                "`/camera/resolution`", source);
   warn_unused(scene, json, "/integrator/seeds", "/integrator/paths");
   if (given(json, "/integrator/samples"))  // Other programs and the lens use this name.
