@@ -88,6 +88,9 @@ FieldChoices choices_of(const SceneDescription& description);
 /// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
 LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const std::string& source);
 
+/// The field of a description, from its file or generator. @throw as load_scene.
+LoadedField load_field(const SceneDescription& description, const Progress& progress);
+
 /// Descriptions of scenes with the same field have the same key: all keys of the field but `scale` and `bounds`, what
 /// is between its voxels, whether it keeps its surface, its eigenvalues, and what tells whether its file has changed.
 std::string field_key(const SceneDescription& description);

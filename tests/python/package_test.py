@@ -35,9 +35,6 @@ class PackageTest(unittest.TestCase):
         self.assertTrue(names["rays"].landed.any())
 
     def test_imports(self):
-        program = os.path.join(os.path.dirname(os.environ["TENSORRAY_BINARY"]), "tensorray-import")
-        if not os.path.exists(program):
-            self.skipTest("tensorray-import is not built")
         tensors = np.random.default_rng(1).normal(size=(4, 5, 6, 3, 3)).astype("f4")
         with tempfile.TemporaryDirectory() as folder:
             file = os.path.join(folder, "t.npy")

@@ -34,11 +34,7 @@ TEST(Python, LongCalls) { run("long_calls_test.py"); }
 TEST(Python, Rays) { run("rays_test.py"); }
 TEST(Python, Shards) { run("shards_test.py"); }
 TEST(Python, Package) { run("package_test.py"); }
-TEST(Python, Doors) {
-  if (!std::filesystem::exists(std::filesystem::path(TENSORRAY_BINARY).parent_path() / "tensorray-import"))
-    GTEST_SKIP() << "tensorray-import is not built";
-  run("../doors");
-}
+TEST(Python, Doors) { run("../doors"); }
 
 TEST(Python, Notebooks) {
   const std::string imports =
