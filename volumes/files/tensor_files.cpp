@@ -16,6 +16,7 @@
 #include "base/text/text.h"
 #include "volumes/files/grid_voxels.h"
 #include "volumes/files/surface_grids.h"
+#include "volumes/grids/mirror.h"
 #include "volumes/tensors/finite_differences.h"
 
 namespace tensorray {
@@ -302,8 +303,12 @@ BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string
     fail_too_large(path, result.name);
   }
   if (!derives) result.fill = fill_of(path, grids);
-  if (is_stress(wanted)) return stress_of(std::move(result), wanted == Derive::viscous_stress ? 1.0f : -1.0f);
-  return result;
+  if (is_stress(wanted)) result = stress_of(std::move(result), wanted == Derive::viscous_stress ? 1.0f : -1.0f);
+  try {
+    return with_mirror_image(std::move(result));
+  } catch (const std::invalid_argument& error) {
+    fail(path, error.what());
+  }
 }
 
 TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name, Derive derive,

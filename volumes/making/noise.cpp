@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -47,6 +48,9 @@ double variation(const TensorGrid& grid) {
 }
 
 void keep_noise(TensorGrid& grid) {
+  if (!grid.finer.empty())
+    throw std::invalid_argument(
+        "noise: a field of several levels was not measured at its voxels; give one of one level");
   const Eigen::Matrix3f middle = (mean_of(grid).trace() / 3 * Eigen::Matrix3d::Identity()).cast<float>();
   TensorGrid smoothed = grid;
   smooth(smoothed, 1);

@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "volumes/bricks/brick_index.h"
+#include "volumes/making/level_grid.h"
 
 namespace tensorray {
 namespace {
@@ -21,13 +22,13 @@ using Weights = std::vector<double>;
 using BlockNumbers = std::vector<std::size_t>;
 
 constexpr double cut = 4;  // Deviations at which the Gaussian ends.
+constexpr double least_smoothing = 1 / cut;
 
 /// The Gaussian at −radius … radius.
 Weights gaussian(double deviation) {
   const int radius = static_cast<int>(cut * deviation);
   Weights weights;
-  for (int i = -radius; i <= radius; ++i)
-    weights.push_back(radius == 0 ? 1 : std::exp(-0.5 * (i / deviation) * (i / deviation)));
+  for (int i = -radius; i <= radius; ++i) weights.push_back(std::exp(-0.5 * (i / deviation) * (i / deviation)));
   return weights;
 }
 
@@ -138,15 +139,8 @@ struct TileSmoothing {
   }
 };
 
-}  // namespace
-
-void smooth(TensorGrid& grid, double deviation) {
-  if (!(deviation >= 0 && deviation <= max_smoothing))
-    throw std::invalid_argument("smooth: the deviation must be 0 to 20 voxels");
-  if (deviation > 0 && !grid.finer.empty())
-    throw std::invalid_argument("smooth: a field of several levels is not smoothed; import it with `--levels 1`");
-  const Weights weights = gaussian(deviation);
-  if (radius_of(weights) == 0 || grid.blocks.empty()) return;
+/// The blocks of a grid of one level, smoothed.
+TensorBlocks smoothed_blocks(const TensorGrid& grid, const Weights& weights) {
   const std::vector<BlockShape> shapes = grid.shapes();
   const AlignedBox3i extent = active_box(shapes);
   std::vector<Vector3i> places;
@@ -157,7 +151,30 @@ void smooth(TensorGrid& grid, double deviation) {
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
     TileSmoothing{grid, shapes, index, extent, weights}.smooth(tiles[i], results);
   });
-  grid.blocks = std::move(results);
+  return results;
+}
+
+/// Smooths a finer level, of a grid whose coarser ones are not smoothed yet.
+void smooth_level(TensorGrid& grid, int level, double deviation) {
+  const Weights weights = gaussian(deviation);
+  const TensorBlocks results = smoothed_blocks(level_grid(grid, level, radius_of(weights)), weights);
+  auto result = results.begin();  // Both have the same order, and the level has a part of the results.
+  for (TensorBlock& block : grid.finer[static_cast<std::size_t>(level) - 1]) {
+    while (result->origin != block.origin) ++result;
+    block.values = result->values;
+  }
+}
+
+}  // namespace
+
+void smooth(TensorGrid& grid, double deviation) {
+  const double finest = std::exp2(static_cast<double>(grid.finer.size())) * deviation;
+  if (!(deviation >= 0 && finest <= max_smoothing))
+    throw std::invalid_argument("smooth: the deviation must be 0 to 20 voxels of the finest level");
+  if (grid.blocks.empty()) return;
+  for (int level = static_cast<int>(grid.finer.size()); level > 0; --level)
+    if (std::exp2(level) * deviation >= least_smoothing) smooth_level(grid, level, std::exp2(level) * deviation);
+  if (deviation >= least_smoothing) grid.blocks = smoothed_blocks(grid, gaussian(deviation));
 }
 
 }  // namespace tensorray

@@ -13,8 +13,10 @@ constexpr double max_smoothing = 20;  ///< Voxels: a thread's memory grows with 
 /// darken the field. A constant field stays the same, bit for bit; a symmetric one stays symmetric.
 /// Runs on all threads; the result does not depend on their number. Takes the memory of a second grid.
 /// @param grid       All values finite.
-/// @param deviation  σ, voxels along each axis of the grid; 0 to `max_smoothing`. Below 1/4 nothing changes.
-/// @throw std::invalid_argument if the deviation is out of range, or the grid has several levels.
+/// Finer levels are smoothed by the same width in space, together with the coarser voxels about them.
+/// @param deviation  σ, voxels of level 0 along each axis of the grid; 0 to `max_smoothing`, and so in voxels of the
+///                   finest level. Levels of which it is below 1/4 of a voxel do not change.
+/// @throw std::invalid_argument if the deviation is out of range.
 void smooth(TensorGrid& grid, double deviation);
 
 }  // namespace tensorray

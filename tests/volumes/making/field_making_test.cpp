@@ -8,6 +8,7 @@
 #include "tests/volumes/grid_support.h"
 #include "tests/volumes/level_support.h"
 #include "volumes/bricks/brick_layout.h"
+#include "volumes/making/noise.h"
 #include "volumes/making/smoothing.h"
 
 namespace tensorray {
@@ -173,11 +174,28 @@ TEST(Smoothing, RejectsDeviationsOutOfRange) {
     EXPECT_THROW(smooth(grid, deviation), std::invalid_argument) << deviation;
 }
 
-TEST(Smoothing, LevelsAreRefused) {
+/// A wave is lower by exp(−σ²k²/2), at the voxels of every level. Beside a level, those about it are interpolated
+/// linearly, which is wrong by k²/8 at most, of half of the weights.
+TEST(Smoothing, LevelsKeepTheWidthInSpace) {
+  constexpr double k = 0.3, deviation = 1.5, left = 0.903707;  // exp(−σ²k²/2)
+  const Formula wave = [](const Vector3d& at) { return Matrix3d(Matrix3d::Identity() * std::cos(k * at.x())); };
+  TensorGrid grid = grid_of_levels(
+      {Vector3i::Zero(), Vector3i(63, 23, 23)}, 3, [](const Vector3i& brick) { return brick.x() < 4; }, wave);
+  smooth(grid, deviation);
+  for (int level = 0; level < 3; ++level)
+    for (const TensorBlock& block : *levels_of(grid)[static_cast<std::size_t>(level)])
+      for (std::size_t i = 0; i < TensorBlock::voxels; ++i) {
+        const Vector3d at = (block.origin + TensorBlock::position(static_cast<int>(i))).cast<double>() / (1 << level);
+        if (!block.active[i] || at.x() < 4 * deviation || at.x() > 63 - 4 * deviation) continue;
+        const double tolerance = level > 0 && at.x() > 32 - 4 * deviation ? k * k / 16 : 3e-4;
+        ASSERT_NEAR(block.values[i](1, 1), left * std::cos(k * at.x()), tolerance) << level << " " << at.transpose();
+      }
+}
+
+TEST(Smoothing, NoiseOfLevelsIsRefused) {
   TensorGrid grid = grid_of(smoothed_box, waves);
   grid.finer.push_back(grid.blocks);
-  EXPECT_NO_THROW(smooth(grid, 0));
-  EXPECT_THROW(smooth(grid, 1), std::invalid_argument);
+  EXPECT_THROW(keep_noise(grid), std::invalid_argument);
 }
 
 }  // namespace
