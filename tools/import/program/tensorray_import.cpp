@@ -36,6 +36,7 @@
 #include "volumes/bricks/brick_layout.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/files/tensor_files.h"
+#include "volumes/grids/mirror.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
@@ -56,7 +57,7 @@ struct ImportOptions {
   double thickness = 0, finest = 0;
   int levels = 0;
   std::filesystem::path output, boundary;
-  std::string name, units, steps = "last";
+  std::string name, units, mirror, steps = "last";
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
   bool no_surface = false, half = false, quiet = false, silent = false, tells_progress = false;
 };
@@ -195,6 +196,11 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
   if (!options.name.empty()) grid.name = options.name;
   grid.metadata["tensorray:field"] = grid.name;
   if (!options.units.empty()) grid.metadata["tensorray:units"] = options.units;
+  if (!options.mirror.empty()) {
+    grid.metadata[mirror_key] = options.mirror;
+    with_mirror_image(view_of(grid));  // Does it fit?
+    report.notes.push_back(fmt::format("half of a field: readers add its mirror image in {} = 0", options.mirror));
+  }
   progress.update("writing", 0, 1);
   const std::string name = grid.name;
   const bool is_symmetric = asymmetry(grid) < symmetric_tolerance;
@@ -398,6 +404,12 @@ void add_where(CLI::App& command, ImportOptions& options) {
                   "compress the file more: with --half it is a third as large")
       ->option_text("PART");
   command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6);
+  command
+      .add_option("--mirror", options.mirror,
+                  "What is imported is half of a symmetric field: readers of the file add its mirror image in the plane "
+                  "x = 0, y = 0 or z = 0 of the file")
+      ->check(CLI::IsMember({"x", "y", "z"}))
+      ->option_text("AXIS");
 }
 
 /// Adds the options to `program`. The import runs when they are parsed. Errors are exceptions: CLI::Error and
