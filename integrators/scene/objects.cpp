@@ -83,7 +83,7 @@ void load_pictures(const ObjectDescription& description, const ColorManagement& 
   if (surface.places.empty())
     throw std::runtime_error(description.file.string() +
                              ": has no texture coordinates (u, v), which pictures need; "
-                             "unwrap it, and write it as .obj, .gltf, .glb, .dae or .fbx");
+                             "unwrap it, and write it as .ply, .obj, .gltf, .glb, .dae or .fbx");
   for (const Eigen::Vector2f& place : surface.places)
     if (!place.allFinite())
       throw std::runtime_error(description.file.string() + ": a texture coordinate is not there; unwrap it again");

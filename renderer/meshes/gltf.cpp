@@ -5,9 +5,10 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <set>
+#include <optional>
 #include <stdexcept>
 
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 #include "base/text/byte_order.h"
@@ -76,25 +77,31 @@ float float_of(const char* bytes, bool is_normalized) {
   return is_normalized ? std::max(-1.0F, number / static_cast<float>(std::numeric_limits<Integer>::max())) : number;
 }
 
-struct IntegerType {
+struct NumberOf {
   std::size_t bytes;
   float (*read)(const char* bytes, bool is_normalized);
 };
 
-const std::map<int, IntegerType> integer_types{{5120, {1, float_of<std::int8_t>}},
-                                               {5121, {1, float_of<std::uint8_t>}},
-                                               {5122, {2, float_of<std::int16_t>}},
-                                               {5123, {2, float_of<std::uint16_t>}}};
+constexpr int float_type = 5126;
+const std::map<int, NumberOf> number_types{{5120, {1, float_of<std::int8_t>}},
+                                           {5121, {1, float_of<std::uint8_t>}},
+                                           {5122, {2, float_of<std::int16_t>}},
+                                           {5123, {2, float_of<std::uint16_t>}},
+                                           {float_type, {4, float_of<float>}}};
 
-/// Makes an accessor of two or three integers one of as many floats.
-void make_floats(const fs::path& path, Json& json, std::size_t index, Files& files) {
+/// How texture coordinates move (KHR_texture_transform).
+using Move = Eigen::Affine2f;
+
+/// Makes an accessor of two or three integers, or of two numbers that move, one of as many floats.
+void make_floats(const fs::path& path, Json& json, std::size_t index, const Move* move, Files& files) {
   Json& accessor = json.at("accessors").at(index);
-  const auto type = integer_types.find(accessor.at("componentType").get<int>());
-  if (type == integer_types.end() || !accessor.contains("bufferView")) return;
+  const int kind_of_number = accessor.at("componentType").get<int>();
+  const auto type = number_types.find(kind_of_number);
+  if (type == number_types.end() || !accessor.contains("bufferView") || (kind_of_number == float_type && !move)) return;
   const std::string name = "its accessor " + std::to_string(index);
   const std::string kind = accessor.value("type", "");
   if (accessor.contains("sparse") || (kind != "VEC2" && kind != "VEC3"))
-    throw std::runtime_error(name + " has sparse integers, or not two or three; write it again without quantization");
+    throw std::runtime_error(name + " has sparse numbers, or not two or three; write it again without quantization");
   const std::size_t parts = kind == "VEC2" ? 2 : 3;
   const Json view = json.at("bufferViews").at(accessor.at("bufferView").get<std::size_t>());
   const std::string& bytes = buffer_of(path, json, view.at("buffer").get<std::size_t>(), files);
@@ -106,12 +113,16 @@ void make_floats(const fs::path& path, Json& json, std::size_t index, Files& fil
   std::string& floats = files[floats_name];
   json["bufferViews"].push_back(
       {{"buffer", json.at("buffers").size()}, {"byteOffset", floats.size()}, {"byteLength", 4 * parts * count}});
-  for (std::size_t i = 0; i < parts * count; ++i) {
-    const char* const at = &bytes[first + i / parts * stride + i % parts * type->second.bytes];
-    append_number(type->second.read(at, accessor.value("normalized", false)), ByteOrder::little, floats);
+  for (std::size_t i = 0; i < count; ++i) {
+    Eigen::Vector3f numbers(0, 0, 0);
+    for (std::size_t k = 0; k < parts; ++k)
+      numbers[int(k)] =
+          type->second.read(&bytes[first + i * stride + k * type->second.bytes], accessor.value("normalized", false));
+    if (move) numbers.head<2>() = *move * Eigen::Vector2f(numbers.head<2>());
+    for (std::size_t k = 0; k < parts; ++k) append_number(numbers[int(k)], ByteOrder::little, floats);
   }
   accessor["bufferView"] = json["bufferViews"].size() - 1;
-  accessor["componentType"] = 5126;
+  accessor["componentType"] = float_type;
   for (const char* gone : {"byteOffset", "normalized", "min", "max"}) accessor.erase(gone);
 }
 
@@ -131,18 +142,46 @@ void check_extensions(const Json& json) {
   }
 }
 
-/// The accessors of positions, normals and texture coordinates. Removes all other attributes but those of skins, which
-/// have no geometry.
-std::set<std::size_t> geometry_of(Json& json) {
-  std::set<std::size_t> accessors;
+/// The texture of a primitive's base colour; empty: it has none.
+Json picture_of(const Json& json, const Json& primitive) {
+  if (!primitive.contains("material")) return Json::object();
+  const Json& material = json.at("materials").at(primitive["material"].get<std::size_t>());
+  return material.value("/pbrMetallicRoughness/baseColorTexture"_json_pointer, Json::object());
+}
+
+/// T R S. In the format's axes, v is down, and R turns as the extension's example says: its listing has the other turn.
+Move move_of(const Json& given) {
+  const auto offset = given.value("offset", std::array{0.0F, 0.0F}),
+             scale = given.value("scale", std::array{1.0F, 1.0F});
+  return Eigen::Translation2f(offset[0], offset[1]) * Eigen::Rotation2Df(-given.value("rotation", 0.0F)) *
+         Eigen::Scaling(scale[0], scale[1]);
+}
+
+/// The accessors of positions, normals and texture coordinates; those of a picture of the base colour have copies that
+/// move as it does. Removes all other attributes but those of skins, which have no geometry.
+std::map<std::size_t, std::optional<Move>> geometry_of(Json& json) {
+  std::map<std::size_t, std::optional<Move>> accessors;
   for (Json& mesh : json.at("meshes"))
     for (Json& primitive : mesh.at("primitives")) {
       primitive.erase("targets");
+      const Json picture = picture_of(json, primitive);
+      const Json move = picture.value("/extensions/KHR_texture_transform"_json_pointer, Json::object());
+      const std::string places = "TEXCOORD_" + std::to_string(move.value("texCoord", picture.value("texCoord", 0)));
       Json kept = Json::object();
       for (const auto& [name, accessor] : primitive.at("attributes").items()) {
-        const bool is_geometry = name == "POSITION" || name == "NORMAL" || name == "TEXCOORD_0";
-        if (is_geometry) accessors.insert(accessor.get<std::size_t>());
-        if (is_geometry || starts_with(name, "JOINTS_") || starts_with(name, "WEIGHTS_")) kept[name] = accessor;
+        auto index = accessor.get<std::size_t>();
+        const bool is_picture = name == places;
+        const bool is_geometry = name == "POSITION" || name == "NORMAL" || is_picture;
+        if (is_picture && (!move.empty() || name != "TEXCOORD_0")) {
+          const Json copy = json.at("accessors").at(index);
+          index = json["accessors"].size();
+          json["accessors"].push_back(copy);
+          accessors[index] = move_of(move);
+        } else if (is_geometry) {
+          accessors.try_emplace(index);
+        }
+        if (is_geometry || starts_with(name, "JOINTS_") || starts_with(name, "WEIGHTS_"))
+          kept[is_picture ? "TEXCOORD_0" : name] = index;
       }
       primitive["attributes"] = kept;
     }
@@ -159,7 +198,8 @@ std::map<std::string, std::string> gltf_in_memory(const fs::path& path) {
     if (!starts_with(json.at("asset").at("version").get<std::string>(), "2")) return {};
     check_extensions(json);
     if (!json.contains("meshes")) return {};
-    for (const std::size_t accessor : geometry_of(json)) make_floats(path, json, accessor, files);
+    for (const auto& [accessor, move] : geometry_of(json))
+      make_floats(path, json, accessor, move ? &*move : nullptr, files);
     if (files.count(floats_name) == 0) return {};
     for (Json& buffer : json.at("buffers"))
       if (!buffer.contains("uri")) buffer["uri"] = binary_name;

@@ -30,7 +30,7 @@ struct MeshWithNormals {
 /// finite in single precision.
 TriangleMesh read_mesh(const std::filesystem::path& path, const Eigen::Matrix3d& turn = Eigen::Matrix3d::Identity());
 
-/// The same mesh for pictures. Places are those of .obj, .gltf, .glb, .dae and .fbx.
+/// The same mesh for pictures. Places are those of .ply, .obj, .gltf, .glb, .dae and .fbx.
 /// @param smooth_angle  Radians: normals are made so that edges look smooth where triangles are turned against each
 /// other by at most this. None: the normals of the file, flat triangles where it has none.
 MeshWithNormals read_mesh_with_normals(const std::filesystem::path& path, std::optional<double> smooth_angle,

@@ -13,10 +13,11 @@
 
 namespace tensorray {
 
-/// The Stanford polygon format (.ply), ASCII and binary: the elements `vertex` (x, y, z and nx, ny, nz), `face` and
-/// `tristrips` (vertex_indices, where −1 begins a new strip). All others are skipped.
-/// This reader exists because assimp 5.2 does not read the format reliably: it repeats the last face of a truncated
-/// file, never returns from a truncated header, and misreads binary vertices that begin with the byte of a line end.
+/// The Stanford polygon format (.ply), ASCII and binary: the elements `vertex` (x, y, z; nx, ny, nz; u, v or s, t, also
+/// after texture_), `face` (vertex_indices, texcoord) and `tristrips` (vertex_indices, where −1 begins a new strip).
+/// All others are skipped. This reader exists because assimp 5.2 does not read the format reliably: it repeats the last
+/// face of a truncated file, never returns from a truncated header, and misreads binary vertices that begin with the
+/// byte of a line end.
 MeshWithNormals read_ply(const std::filesystem::path& path);
 
 /// Wavefront's format (.obj): v, vt, vn and f; all objects and groups are one mesh. Points, lines and materials have no
@@ -37,8 +38,9 @@ MeshWithNormals read_assimp_mesh(const std::filesystem::path& path);
 void write_assimp_mesh(const std::filesystem::path& path, const std::filesystem::path& exchange);
 
 /// What assimp does not read rightly of glTF 2.0, prepared for it: files by their names, which stand beside a .gltf or
-/// .glb whose positions and normals are integers (KHR_mesh_quantization); gltf_in_memory_name, which is to be
-/// read instead, has floats. Empty if there are none, or the file is no glTF 2.0.
+/// .glb whose positions and normals are integers (KHR_mesh_quantization), or whose base colours move
+/// (KHR_texture_transform) or are not of the first texture coordinates; gltf_in_memory_name, which is to be read
+/// instead, has floats. Empty if there are none, or the file is no glTF 2.0.
 /// @throw std::runtime_error naming an extension that is required but not read, or integers beyond their buffer.
 std::map<std::string, std::string> gltf_in_memory(const std::filesystem::path& path);
 constexpr const char* gltf_in_memory_name = "tensorray.gltf";

@@ -166,21 +166,28 @@ std::size_t to_count(double value) {
 struct PlyContents {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Eigen::Vector3f> normals;  ///< For each vertex; zero: it has none.
-  bool has_normals = false;
-  std::vector<std::uint32_t> corners;  ///< Of all faces.
-  std::vector<std::size_t> face_ends;  ///< Corners up to the end of each face.
+  std::vector<Eigen::Vector2f> places;   ///< For each vertex, in pictures.
+  bool has_normals = false, has_places = false, has_corner_places = false;
+  std::vector<std::uint32_t> corners;          ///< Of all faces.
+  std::vector<Eigen::Vector2f> corner_places;  ///< Those of a face, which MeshLab writes, for each of its corners.
+  std::vector<std::size_t> face_ends;          ///< Corners up to the end of each face.
 };
 
 /// Takes a property of the last vertex.
 void take_coordinate(const Property& property, const std::vector<double>& values, PlyContents& contents) {
-  static const std::vector<std::string> names{"x", "y", "z", "nx", "ny", "nz"};
-  const auto place = std::find(names.begin(), names.end(), property.name) - names.begin();
-  contents.has_normals = contents.has_normals || (place >= 3 && place < 6);
-  if (place >= 6 || values.empty()) return;
-  if (place < 3)
-    contents.vertices.back()[place] = values.back();
-  else
-    contents.normals.back()[place - 3] = static_cast<float>(values.back());
+  static const std::map<std::string, int> numbers{
+      {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3},        {"ny", 4},        {"nz", 5},        {"u", 6},
+      {"v", 7}, {"s", 6}, {"t", 7}, {"texture_u", 6}, {"texture_v", 7}, {"texture_s", 6}, {"texture_t", 7}};
+  const auto found = numbers.find(property.name);
+  if (found == numbers.end() || values.empty()) return;
+  const int number = found->second;
+  if (number < 3) {
+    contents.vertices.back()[number] = values.back();
+    return;
+  }
+  (number < 6 ? contents.has_normals : contents.has_places) = true;
+  (number < 6 ? contents.normals.back()[number - 3] : contents.places.back()[number - 6]) =
+      static_cast<float>(values.back());
 }
 
 std::uint32_t to_index(double value) {
@@ -199,6 +206,27 @@ void add_ply_face(const std::vector<double>& corners, PlyContents& contents) {
                              std::to_string(corners.size()) + " corners; it needs three");
   for (const double corner : corners) contents.corners.push_back(to_index(corner));
   contents.face_ends.push_back(contents.corners.size());
+}
+
+void add_corner_places(const std::vector<double>& numbers, PlyContents& contents) {
+  contents.has_corner_places = true;
+  for (std::size_t i = 1; i < numbers.size(); i += 2)
+    contents.corner_places.emplace_back(static_cast<float>(numbers[i - 1]), static_cast<float>(numbers[i]));
+}
+
+/// Makes each corner a vertex, with its place; mesh.cpp joins those that are equal.
+PlyContents with_split_corners(PlyContents contents) {
+  contents.corner_places.resize(contents.corners.size(), Eigen::Vector2f(NAN, NAN));
+  const auto vertices = std::exchange(contents.vertices, {});
+  const auto normals = std::exchange(contents.normals, {});
+  for (std::uint32_t& corner : contents.corners) {
+    contents.vertices.push_back(vertices[corner]);
+    contents.normals.push_back(normals[corner]);
+    corner = static_cast<std::uint32_t>(contents.vertices.size() - 1);
+  }
+  contents.places = contents.corner_places;
+  contents.has_places = true;
+  return contents;
 }
 
 /// Adds the triangles of strips: each corner makes one with the two before it, and every second is turned round.
@@ -224,7 +252,9 @@ void read_element(const Element& element, Numbers& numbers, PlyContents& content
   const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
   std::vector<double> values;
   for (std::size_t row = 0; row < element.count; ++row) {
-    if (is_vertex) contents.vertices.emplace_back(0, 0, 0), contents.normals.emplace_back(0, 0, 0);
+    if (is_vertex) contents.vertices.emplace_back(0, 0, 0);
+    if (is_vertex) contents.normals.emplace_back(0, 0, 0), contents.places.emplace_back(0, 0);
+    if (is_face) contents.corner_places.resize(contents.corners.size(), Eigen::Vector2f(NAN, NAN));
     for (const Property& property : element.properties) {
       values.clear();
       const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
@@ -233,6 +263,8 @@ void read_element(const Element& element, Numbers& numbers, PlyContents& content
         take_coordinate(property, values, contents);
       else if (is_face && is_corners(property))
         add_ply_face(values, contents);
+      else if (is_face && property.is_list && property.name == "texcoord")
+        add_corner_places(values, contents);
       else if (element.name == "tristrips" && is_corners(property))
         add_strips(values, contents);
     }
@@ -240,17 +272,19 @@ void read_element(const Element& element, Numbers& numbers, PlyContents& content
 }
 
 MeshWithNormals mesh_of_ply(PlyContents contents) {
+  for (const std::uint32_t corner : contents.corners)
+    if (corner >= contents.vertices.size()) throw std::runtime_error("a face names a vertex that is not there");
+  if (contents.has_corner_places) contents = with_split_corners(std::move(contents));
   MeshWithNormals result;
   result.mesh.vertices = std::move(contents.vertices);
   if (contents.has_normals) result.normals = std::move(contents.normals);
+  if (contents.has_places) result.places = std::move(contents.places);
   std::vector<std::uint32_t> face;
   auto first = contents.corners.begin();
   for (const std::size_t end : contents.face_ends) {
     const auto last = contents.corners.begin() + static_cast<std::ptrdiff_t>(end);
     face.assign(first, last);
     first = last;
-    for (const std::uint32_t corner : face)
-      if (corner >= result.mesh.vertices.size()) throw std::runtime_error("a face names a vertex that is not there");
     add_polygon(face, result.mesh);
   }
   return result;

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "base/text/path_text.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 namespace {
@@ -108,9 +109,9 @@ bool Value<std::filesystem::path>::read(const Json& json, const Limits& limits, 
   std::string text;
   if (!Value<std::string>::read(json, limits, text) || text.empty()) return false;
   target = path_of_text(text);
-  const std::string ending = target.extension().string();
-  const auto& allowed = limits.endings;
-  return allowed.empty() || std::find(allowed.begin(), allowed.end(), ending) != allowed.end();
+  const std::string name = target.filename().string();
+  const auto ends = [&](const std::string& ending) { return name.size() > ending.size() && ends_with(name, ending); };
+  return limits.endings.empty() || std::any_of(limits.endings.begin(), limits.endings.end(), ends);
 }
 
 std::string Value<std::filesystem::path>::expectation(const std::filesystem::path&, const Limits& limits) {

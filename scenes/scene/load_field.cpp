@@ -78,8 +78,11 @@ LoadedField with_notes(MadeField made, const std::string& source) {
   if (is_coarse(made.resolution))
     notes.push_back(fmt::format(
         "warning: {}: voxels are too coarse, or have noise: linear and cubic interpolation differ by {:.0f}% of the "
-        "field's norm in one of 10 cells, {:.0f}% in one of 100; sample the field more finely, or smooth it",
-        source, 100 * made.resolution.percentile_90, 100 * made.resolution.percentile_99));
+        "field's norm in one of 10 cells, {:.0f}% in one of 100; sample the field more finely, or smooth it{}",
+        source, 100 * made.resolution.percentile_90, 100 * made.resolution.percentile_99,
+        eigenvalues.chosen == Eigenvalues::absolute ? "; or the kinks are those of absolute eigenvalues, where they "
+                                                      "change sign: \"eigenvalues\": \"raw\" has none"
+                                                    : ""));
   if (eigenvalues.defective > 0)
     notes.push_back(fmt::format("{} voxels hold a defective tensor, preprocessed by its limit", eigenvalues.defective));
   if (eigenvalues.norm_lost > 0.01)

@@ -153,9 +153,9 @@ void read_slices(const Lattice& lattice) {
   for (int z = lattice.size.z() - 1; z >= 0; --z) lattice.read_slice(z, values.data());
 }
 
-template <Lattice (*open)(const Path&)>
+template <Lattice (*open)(const Path&, bool)>
 void read_lattice(const Path& path) {
-  read_slices(open(path));
+  read_slices(open(path, false));
 }
 
 /// The library reads only files with this ending.

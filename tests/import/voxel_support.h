@@ -67,11 +67,11 @@ inline void expect_error(const std::function<void()>& run, const std::vector<std
 }
 
 /// Expects that a file with these bytes is refused, in one line with its name and `words`.
-inline void refuses(Lattice (*open)(const std::filesystem::path&), const std::string& name, const std::string& bytes,
-                    std::vector<std::string> words = {}) {
+inline void refuses(Lattice (*open)(const std::filesystem::path&, bool), const std::string& name,
+                    const std::string& bytes, std::vector<std::string> words = {}) {
   const TemporaryFile file(name, bytes);
   words.insert(words.begin(), name);
-  expect_error([&] { tensors_of(open(file), TensorOrder::fsl); }, words);
+  expect_error([&] { tensors_of(open(file, false), TensorOrder::fsl); }, words);
 }
 
 inline Eigen::Matrix3d rotation() {

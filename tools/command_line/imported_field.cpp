@@ -43,16 +43,17 @@ std::filesystem::path import_program() {
 }  // namespace
 
 void add_import_options(CLI::App& command, ImportChoices& choices) {
-  for (const auto& [flag, meaning] : {std::pair("--order", "Of the tensor's components, as for `tensorray import`"),
-                                      std::pair("--array", "The array that is the tensor, likewise"),
-                                      std::pair("--gradient-of", "The velocity whose gradient it is, likewise"),
-                                      std::pair("--strain-of", "The displacement whose strain it is, likewise"),
-                                      std::pair("--viscous-stress-of", "The velocity of a viscous stress, likewise"),
-                                      std::pair("--frame", "The axes of the components, likewise"),
-                                      std::pair("--voxel-size", "The largest edge of a voxel, likewise"),
-                                      std::pair("--levels", "Most sizes of voxels, likewise"),
-                                      std::pair("--resolution", "Voxels along the longest edge, likewise"),
-                                      std::pair("--mask", "A file that is 0 where there is no tensor, likewise")})
+  for (const auto& [flag, meaning] :
+       {std::pair("--order", "Of the tensor's components: vtk, fsl, mrtrix, voigt or lower, as for `tensorray import`"),
+        std::pair("--array", "The array that is the tensor, likewise"),
+        std::pair("--gradient-of", "The velocity whose gradient it is, likewise"),
+        std::pair("--strain-of", "The displacement whose strain it is, likewise"),
+        std::pair("--viscous-stress-of", "The velocity of a viscous stress, likewise"),
+        std::pair("--frame", "The axes of the components, likewise"),
+        std::pair("--voxel-size", "The largest edge of a voxel, likewise"),
+        std::pair("--levels", "Most sizes of voxels, likewise"),
+        std::pair("--resolution", "Voxels along the longest edge, likewise"),
+        std::pair("--mask", "A file that is 0 where there is no tensor, likewise")})
     command.add_option(flag, choices[flag], meaning)->group("Import");
 }
 
@@ -99,7 +100,8 @@ bool needs_import(const std::filesystem::path& path) {
 
 ImportedField::ImportedField(const std::vector<std::filesystem::path>& files, const ImportChoices& choices, bool quiet)
     : path_(folder_ / "field.vdb") {
-  std::vector<std::string> arguments{"-o", path_.string(), "-q"};
+  tell_as(path_.string(), files.front().string());
+  std::vector<std::string> arguments{"-o", path_.string(), "-q", "--called", files.front().string()};
   for (const auto& [option, value] : choices)
     if (!value.empty()) arguments.insert(arguments.end(), {option, value});
   if (quiet) arguments.emplace_back("--silent");

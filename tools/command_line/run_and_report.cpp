@@ -23,7 +23,7 @@ constexpr int failed = 1, wrong_input = 2, interrupted = 130;
 const char* const help_advice = " (--help says more)";
 
 int report(const std::string& what, int status) {
-  print_error("tensorray: " + escaped(what) + "\n");
+  print_error("tensorray: " + escaped(as_told(what)) + "\n");
   return status;
 }
 
@@ -120,6 +120,15 @@ bool parse(CLI::App& program, int argc, char** argv) {
   } catch (const CLI::ExtrasError& error) {
     throw std::invalid_argument(error.what() + advice_on_option(error.what(), program));
   }
+}
+
+double part_of(const std::string& text, const std::string& option) {
+  double value = 0;
+  const bool is_percent = !text.empty() && text.back() == '%';
+  if (!CLI::detail::lexical_cast(is_percent ? text.substr(0, text.size() - 1) : text, value) || !(value >= 0) ||
+      !(value *= is_percent ? 0.01 : 1.0, value <= 1))
+    throw std::invalid_argument(option + " " + escaped(text) + ": give a part, as 1% or 0.01");
+  return value;
 }
 
 int answer_parent(const std::function<void()>& work) {

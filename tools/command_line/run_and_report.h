@@ -30,6 +30,9 @@ int run_and_report(const std::function<void()>& work);
 /// Parses a program's arguments. @return false if they asked for help or the version, which is printed.
 bool parse(CLI::App& program, int argc, char** argv);
 
+/// The value of an option as a part from 0 to 1: "1%" or "0.01". @throw std::invalid_argument
+double part_of(const std::string& text, const std::string& option);
+
 /// The same as run_and_report for the program that started this one with run_program (base/process/child_program.h):
 /// ends with it, takes no more memory than there is, and prints an error without the program's name.
 int answer_parent(const std::function<void()>& work);

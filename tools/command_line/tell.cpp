@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <utility>
 
 #include <fcntl.h>
 #include <fmt/core.h>
@@ -18,6 +19,7 @@ namespace {
 
 constexpr std::chrono::milliseconds drawing_interval{100}, logging_interval{60'000};
 constexpr int logged_width = 100;
+std::pair<std::string, std::string> told_name;  // A file, and what it is called.
 constexpr const char* clear_line = "\r\033[K";
 
 int terminal_width() {
@@ -66,14 +68,23 @@ void open_standard_streams() {
 
 void print_error(std::string_view text) noexcept { static_cast<void>(write_whole(STDERR_FILENO, text)); }
 
+void tell_as(const std::string& file, const std::string& name) { told_name = {file, name}; }
+
+std::string as_told(std::string text) {
+  const auto& [file, name] = told_name;
+  std::size_t at = file.empty() ? text.npos : text.find(file);
+  for (; at != text.npos; at = text.find(file, at + name.size())) text.replace(at, file.size(), name);
+  return text;
+}
+
 void tell(const std::vector<std::string>& lines, bool quiet) {
   if (quiet) return;
-  for (const std::string& line : lines) print_error(line + "\n");
+  for (const std::string& line : lines) print_error(as_told(line) + "\n");
 }
 
 void tell_made(const std::string& line) {
   std::fflush(stdout);  // In the order of what was printed before.
-  static_cast<void>(write_whole(STDOUT_FILENO, escaped(line) + "\n"));
+  static_cast<void>(write_whole(STDOUT_FILENO, escaped(as_told(line)) + "\n"));
 }
 
 ProgressBar::ProgressBar(Progress& progress, bool quiet)

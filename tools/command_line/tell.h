@@ -21,6 +21,13 @@ void open_standard_streams();
 /// Writes `text` to standard error, as it is.
 void print_error(std::string_view text) noexcept;
 
+/// From now on, what is told calls a file by another name, as it is one that the user has not named. Call it before
+/// there are threads.
+void tell_as(const std::string& file, const std::string& name);
+
+/// Text with that name.
+std::string as_told(std::string text);
+
 /// Prints `lines` on standard error, unless `quiet` is set.
 void tell(const std::vector<std::string>& lines, bool quiet);
 

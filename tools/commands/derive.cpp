@@ -52,7 +52,8 @@ std::map<std::string, std::string> file_metadata(const TensorGrid& field) {
 
 bool is_voxel_image(const std::filesystem::path& file) {
   const std::vector<std::string>& endings = voxel_image_endings();
-  return std::find(endings.begin(), endings.end(), lower_case_ending(file)) != endings.end();
+  const std::string name = lower_case(file.string());
+  return std::any_of(endings.begin(), endings.end(), [&](const auto& ending) { return ends_with(name, ending); });
 }
 
 std::string check_derived(const std::string& text) {
@@ -126,7 +127,7 @@ void add_derive_command(CLI::App& program, Progress& progress) {
   command->add_option("--name", options->field, "Name of the field; not needed where there is only one");
   command
       ->add_option("-o,--output", options->output,
-                   "The file to write, .vdb; or with the voxels of the field: .nii .nrrd .mif .vti")
+                   "The file to write, .vdb; or with the voxels of the field: .nii .nii.gz .nrrd .mif .vti")
       ->required()
       ->check(check_derived)
       ->type_name("FILE");

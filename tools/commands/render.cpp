@@ -12,6 +12,7 @@
 #include "integrators/methods/read_scene.h"
 #include "scenes/source/overrides.h"
 #include "tools/command_line/imported_field.h"
+#include "tools/command_line/run_and_report.h"
 #include "tools/commands/commands.h"
 #include "tools/ranks/ranks.h"
 #include "tools/rendering/render_scene.h"
@@ -45,15 +46,6 @@ std::string output_help() {
   return text;
 }
 
-/// "1%" or "0.01" as a number. @throw std::invalid_argument if it is none.
-double parse_part(const std::string& text) {
-  const bool percent = !text.empty() && text.back() == '%';
-  double value = 0;
-  if (!CLI::detail::lexical_cast(percent ? text.substr(0, text.size() - 1) : text, value) || !(value > 0))
-    throw std::invalid_argument("--until-error " + text + ": give a part greater than 0, such as 1% or 0.01");
-  return percent ? value / 100 : value;
-}
-
 /// "3/16" as a part of work; takes its file from the outputs. @throw std::invalid_argument.
 void take_shard(const std::string& text, SceneChanges& changes, RunKeeping& keeping) {
   const std::size_t slash = text.find('/');
@@ -75,7 +67,7 @@ SceneChanges changes_of(const RenderOptions& options) {
   SceneChanges changes = options.changes;
   if (options.seed) changes.overrides.push_back(fmt::format("seed={}", *options.seed));
   if (!options.error.empty())
-    changes.overrides.push_back(fmt::format("integrator.density.error={}", parse_part(options.error)));
+    changes.overrides.push_back(fmt::format("integrator.density.error={}", part_of(options.error, "--until-error")));
   return changes;
 }
 
@@ -88,9 +80,12 @@ void report_failed(const std::vector<int>& failed) {
 }
 
 /// PICTURE.noise.png of PICTURE.png.
-std::filesystem::path noise_file(std::filesystem::path file) {
-  const std::string ending = file.extension().string();
-  return file.replace_extension(".noise" + ending);
+std::filesystem::path noise_file(const std::filesystem::path& file) {
+  const std::string name = file.string();
+  std::string ending = file.extension().string();
+  for (const char* longer : {".nii.gz", ".spectral.exr"})
+    if (ends_with(name, longer)) ending = longer;
+  return name.substr(0, name.size() - ending.size()) + ".noise" + ending;
 }
 
 /// Renders a scene, and beside its pictures those of the field's noise alone, in the same light, if `split` is set.

@@ -38,7 +38,7 @@ namespace tensorray {
 namespace {
 
 /// The reader of a voxel format; null if the file is of another kind.
-using OpenLattice = Lattice (*)(const std::filesystem::path&);
+using OpenLattice = Lattice (*)(const std::filesystem::path&, bool is_mask);
 
 OpenLattice lattice_reader(const std::filesystem::path& path) {
   const std::pair<OpenLattice, std::vector<const char*>> readers[] = {
@@ -78,13 +78,25 @@ void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {
   keep_voxels(grid, [&](const Eigen::Vector3d& center) { return bounds.contains(center); });
 }
 
-/// Those in voxels of the mask that are not 0.
-void apply_mask(TensorGrid& grid, const std::filesystem::path& file) {
+/// A lattice of a file that does not say where its voxels are: --voxel-size and --origin do.
+Lattice placed(Lattice lattice, const ImportSettings& settings) {
+  const double* const size = std::get_if<double>(&settings.sampling.resolution);
+  if (wants_sampling(settings) && !size)
+    throw std::invalid_argument("has voxels of its own, which are kept: give --voxel-size instead of --resolution");
+  lattice.to_world = Eigen::Translation3d(settings.origin.value_or(Eigen::Vector3d::Zero())) *
+                     Eigen::Scaling(settings.voxel.value_or(Eigen::Vector3d::Constant(size ? *size : 1.0)));
+  return lattice;
+}
+
+/// Those in voxels of the mask that are not 0. It may have other voxels than the grid, in the same world.
+void apply_mask(TensorGrid& grid, const ImportSettings& settings, ImportReport& report) {
+  const std::filesystem::path& file = settings.mask;
   const OpenLattice open = lattice_reader(file);
-  if (open != open_nifti && open != open_mrtrix)
-    throw std::invalid_argument("--mask " + file.string() + ": must be a NIfTI or MRtrix image (.nii .nii.gz .mif)");
-  const Lattice mask = open == open_nifti ? open_nifti_mask(file) : open_mrtrix_mask(file);
-  if (mask.components != 1) fail(file, "--mask: it has several volumes, and a mask has one");
+  if (!open || (open == open_npy && lattice_reader(settings.files.front()) != open_npy))
+    throw std::invalid_argument("--mask " + file.string() +
+                                ": must be NIfTI, NRRD, MetaImage or MRtrix (.nii .nrrd .mha .mif); .npy, of .npy");
+  const Lattice mask = open == open_npy ? placed(open(file, true), settings) : open(file, true);
+  for (const std::string& note : mask.notes) report.notes.push_back("--mask: " + note);
   const std::size_t slice = std::size_t(mask.size.x()) * std::size_t(mask.size.y());
   std::vector<double> values(slice);
   std::vector<char> inside(slice * std::size_t(mask.size.z()));
@@ -153,7 +165,7 @@ TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings
       return tensor_of_gradient(settings.take, G.cast<double>()).cast<float>();
     });
   if (settings.sampling.bounds) crop(grid, *settings.sampling.bounds);
-  if (!settings.mask.empty()) apply_mask(grid, settings.mask);
+  if (!settings.mask.empty()) apply_mask(grid, settings, report);
   grid.metadata["tensorray:voxels"] = fmt::format("{} {} {}", lattice.size.x(), lattice.size.y(), lattice.size.z());
   grid.name = lattice.array;
   report.lattice->active = grid.active_voxels();
@@ -170,13 +182,13 @@ struct SilentVtk {
 };
 
 /// Gives the grid the surface of the mesh, within the bounds that the user gives.
-void add_surface(vtkDataSet& mesh, const ImportSettings& settings, const Progress& progress, TensorGrid& grid,
-                 ImportReport& report) {
+void add_surface(vtkDataSet& mesh, const BodyFaces& faces, const ImportSettings& settings, const Progress& progress,
+                 TensorGrid& grid, ImportReport& report) {
   constexpr double tolerance = 0.0025;  // Of a voxel, of the finest level.
   const SamplingReport& sampled = *report.mesh;
   const double voxel = sampled.finer.empty() ? sampled.voxel.minCoeff() : sampled.finer.back().voxel;
   progress.update("finding the surface", 0, 1);
-  report.surface = body_surface(mesh, tolerance * voxel);
+  report.surface = body_surface(mesh, faces, tolerance * voxel);
   TriangleMesh triangles = std::move(report.surface->mesh);
   if (report.surface->open_edges > 0) return;
   grid.surface = std::move(triangles);
@@ -189,8 +201,8 @@ void add_surface(vtkDataSet& mesh, const ImportSettings& settings, const Progres
 }
 
 /// Of a plate or a shell; 0: there is none, or no surface is made.
-double thickness_of(vtkDataSet& mesh) {
-  const BodySurface surface = body_surface(mesh, std::numeric_limits<double>::infinity());
+double thickness_of(vtkDataSet& mesh, const BodyFaces& faces) {
+  const BodySurface surface = body_surface(mesh, faces, std::numeric_limits<double>::infinity());
   return surface.area > 0 && surface.open_edges == 0 ? 2 * surface.mesh.volume() / surface.area : 0;
 }
 
@@ -219,10 +231,11 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
   warn_of_fills(fills, static_cast<std::size_t>(values.GetNumberOfTuples()), report);
   SamplingSettings sampling = settings.sampling;
   const bool has_surface = settings.surface && !vtkImageData::SafeDownCast(&data);
-  if (has_surface && !wants_sampling(settings)) sampling.thickness = thickness_of(*mesh);
+  const BodyFaces faces = has_surface ? body_faces(*mesh) : BodyFaces();
+  if (has_surface && !wants_sampling(settings)) sampling.thickness = thickness_of(*mesh, faces);
   TensorGrid grid = sample_mesh(*mesh, sampling, progress, *report.mesh);
   grid.name = array.name;
-  if (has_surface) add_surface(*mesh, settings, progress, grid, report);
+  if (has_surface) add_surface(*mesh, faces, settings, progress, grid, report);
   return grid;
 }
 
@@ -308,16 +321,6 @@ TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, ImportSettings sett
   return import_lattice(lattice, settings, report);
 }
 
-/// A lattice of a file that does not say where its voxels are: --voxel-size and --origin do.
-Lattice placed(Lattice lattice, const ImportSettings& settings) {
-  const double* const size = std::get_if<double>(&settings.sampling.resolution);
-  if (wants_sampling(settings) && !size)
-    throw std::invalid_argument("has voxels of its own, which are kept: give --voxel-size instead of --resolution");
-  lattice.to_world = Eigen::Translation3d(settings.origin.value_or(Eigen::Vector3d::Zero())) *
-                     Eigen::Scaling(settings.voxel.value_or(Eigen::Vector3d::Constant(size ? *size : 1.0)));
-  return lattice;
-}
-
 TensorGrid import_any(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
   const std::filesystem::path& file = settings.files.front();
   const OpenLattice open = lattice_reader(file);
@@ -331,10 +334,10 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
     const auto data = read_vtk_source(file, settings.step, &report.notes);
     return import_data_set(data, settings, progress, report);
   }
-  if (open == open_npy) return import_lattice(placed(open(file), settings), settings, report);
+  if (open == open_npy) return import_lattice(placed(open(file, false), settings), settings, report);
   if (wants_sampling(settings))
     throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
-  Lattice lattice = open(file);
+  Lattice lattice = open(file, false);
   if (settings.frame) take_frame(lattice, *settings.frame);
   return import_lattice(lattice, settings, report);
 }

@@ -1,11 +1,13 @@
 #include "volumes/files/voxel_images.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <sstream>
+
+#include <zlib.h>
 
 #include "base/errors.h"
 #include "base/text/text.h"
@@ -111,7 +113,7 @@ std::string vti_header(const VoxelImage& image, std::size_t bytes) {
 }  // namespace
 
 const std::vector<std::string>& voxel_image_endings() {
-  static const std::vector<std::string> endings{".nii", ".nrrd", ".mif", ".vti"};
+  static const std::vector<std::string> endings{".nii", ".nii.gz", ".nrrd", ".mif", ".vti"};
   return endings;
 }
 
@@ -143,23 +145,31 @@ VoxelImage voxel_image(const std::vector<ScalarGrid>& grids, const Vector3i& vox
 }
 
 void write_voxel_image(const std::filesystem::path& file, const VoxelImage& image) {
-  const std::string ending = lower_case(file.extension().string());
+  const std::string ending = lower_case_ending(file);
+  const bool is_nifti = ending == ".nii" || ending == ".gz";
   const std::size_t bytes = image.values.size() / image.names.size() * sizeof(float);
-  if (ending == ".nii" && image.size.maxCoeff() > std::numeric_limits<std::int16_t>::max())
+  if (is_nifti && image.size.maxCoeff() > std::numeric_limits<std::int16_t>::max())
     fail(file, "NIfTI has at most 32767 voxels along an axis; write .nrrd");
-  std::ofstream stream(file, std::ios::binary);
-  stream << (ending == ".nii"    ? nifti_header(image)
-             : ending == ".nrrd" ? nrrd_header(image)
-             : ending == ".mif"  ? mif_header(image)
-                                 : vti_header(image, bytes));
-  const char* const values = reinterpret_cast<const char*>(image.values.data());
+  const gzFile stream = gzopen(file.c_str(), ending == ".gz" ? "wb" : "wbT");  // T: as it is, not compressed.
+  bool is_written = stream != nullptr;
+  const auto write = [&](const char* data, std::size_t size) {
+    constexpr std::size_t most = 1 << 30;  // Of bytes at once, for zlib.
+    for (; is_written && size > 0; data += std::min(size, most), size -= std::min(size, most))
+      is_written = gzwrite(stream, data, static_cast<unsigned>(std::min(size, most))) > 0;
+  };
+  const std::string header = is_nifti            ? nifti_header(image)
+                             : ending == ".nrrd" ? nrrd_header(image)
+                             : ending == ".mif"  ? mif_header(image)
+                                                 : vti_header(image, bytes);
+  write(header.data(), header.size());
   for (std::size_t i = 0; i < image.names.size(); ++i) {
     const std::uint64_t size = bytes;
-    if (ending == ".vti") stream.write(reinterpret_cast<const char*>(&size), sizeof size);
-    stream.write(values + i * bytes, static_cast<std::streamsize>(bytes));
+    if (ending == ".vti") write(reinterpret_cast<const char*>(&size), sizeof size);
+    write(reinterpret_cast<const char*>(image.values.data()) + i * bytes, bytes);
   }
-  if (ending == ".vti") stream << "\n</AppendedData>\n</VTKFile>\n";
-  if (!stream.flush()) fail(file, "cannot be written: the disk may be full");
+  const std::string end = "\n</AppendedData>\n</VTKFile>\n";
+  if (ending == ".vti") write(end.data(), end.size());
+  if (!stream || gzclose(stream) != Z_OK || !is_written) fail(file, "cannot be written: the disk may be full");
 }
 
 }  // namespace tensorray

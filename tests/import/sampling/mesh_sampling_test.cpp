@@ -108,9 +108,18 @@ TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
   EXPECT_TRUE(report.voxel.isApprox(Vector3d(0.5, 0.2, 0.5 / 6)));
   EXPECT_EQ(report.active, 5u * 6u * 7u);
 
-  settings.resolution = 0.3;
-  sampled(*mesh, settings, report);
-  EXPECT_EQ(report.size, Vector3i(7, 4, 2));
+  // A voxel of another size than the body's parts becomes smaller: the field has the faces, and no more.
+  for (const auto& [voxel, size] : {std::pair(0.3, Vector3i(8, 5, 3)), {0.667, {4, 3, 2}}, {2.0, {2, 2, 2}}}) {
+    settings.resolution = voxel;
+    const TensorGrid grid = sampled(*mesh, settings, report);
+    EXPECT_EQ(report.size, size);
+    EXPECT_EQ(report.active, static_cast<std::size_t>(size.prod()));
+    EXPECT_LE(report.voxel.maxCoeff(), 1.01 * voxel);
+    EXPECT_TRUE((grid.to_world * Vector3d::Zero()).isApprox(Vector3d(1, 0, 0), 1e-12));
+    EXPECT_TRUE((grid.to_world * (size - Vector3i::Ones()).cast<double>()).isApprox(Vector3d(3, 1, 0.5), 1e-12));
+    EXPECT_NEAR(report.volume, 1, 1e-12);
+    expect_linear(grid);
+  }
 
   sampled(*mesh, {}, report);  // the cells are 1/2 x 1/4 x 1/8: a cube of the same volume has an edge of 1/4
   EXPECT_TRUE(report.voxel.isApprox(Vector3d(0.25, 0.25, 0.125), 1e-9));

@@ -24,6 +24,8 @@
 namespace tensorray {
 namespace {
 
+BodySurface surface_of(vtkDataSet& mesh, double tolerance) { return body_surface(mesh, body_faces(mesh), tolerance); }
+
 using namespace mesh_fixtures;
 
 Vector3d as_it_is(const Vector3d& p) { return p; }
@@ -131,7 +133,7 @@ TEST_P(BodySurfaceOf, OneCellIsItsOwn) {
   Eigen::Affine3d map;
   map.linear() << 1.1, 0.2, -0.1, 0.1, 0.9, 0.25, -0.3, 0.15, 1.3;
   map.translation() << 3, -2, 5;
-  const BodySurface surface = body_surface(*one_cell(GetParam(), map), 1e-3);
+  const BodySurface surface = surface_of(*one_cell(GetParam(), map), 1e-3);
   EXPECT_EQ(surface.open_edges, 0u);
   EXPECT_EQ(euler_characteristic(surface.mesh), 2);
   EXPECT_NEAR(surface.mesh.volume(), parametric_volume(GetParam()) * map.linear().determinant(), 1e-9);
@@ -146,7 +148,7 @@ TEST_P(BodySurfaceOfMany, HasTheVolumeAndAreaOfTheBody) {
       continue;  // They fold.
     SCOPED_TRACE(body.name);
     const int n = 6;
-    const BodySurface surface = body_surface(*divided(GetParam(), n, body.map), 1e-3);
+    const BodySurface surface = surface_of(*divided(GetParam(), n, body.map), 1e-3);
     EXPECT_EQ(surface.open_edges, 0u);
     EXPECT_EQ(surface.inner_faces, 0u);
     EXPECT_EQ(euler_characteristic(surface.mesh), body.euler);
@@ -167,7 +169,7 @@ TEST(BodySurface, CurvedCellsAreDividedAsTheToleranceSays) {
   const Grid ball = divided({VTK_LAGRANGE_HEXAHEDRON, 4}, 4, to_ball);
   std::size_t triangles = 0;
   for (const double tolerance : {1e-2, 2e-3, 5e-4}) {
-    const BodySurface surface = body_surface(*ball, tolerance);
+    const BodySurface surface = surface_of(*ball, tolerance);
     for (std::size_t i = 0; i < surface.mesh.triangles.size(); ++i) {
       Vector3d centre = Vector3d::Zero();
       for (const std::uint32_t vertex : surface.mesh.triangles[i]) centre += surface.mesh.vertices[vertex] / 3;
@@ -208,7 +210,7 @@ TEST(BodySurface, InnerFacesAreCountedAndThoseWithOtherDiagonalsAreGone) {
                         Case{divided(curved, 2, as_it_is), divided(hexes, 2, beside), 12, 80},
                         Case{divided(hexes, 2, as_it_is), divided(hexes, 3, beside), 4 + 9, 48 + 108}}) {
     const auto mesh = one_data_set({c.first, c.second});
-    const BodySurface surface = body_surface(*mesh, 0.01);
+    const BodySurface surface = surface_of(*mesh, 0.01);
     EXPECT_EQ(surface.inner_faces, c.inner);
     EXPECT_EQ(surface.mesh.triangles.size(), c.triangles);
     EXPECT_EQ(surface.open_edges, 0u);
@@ -226,7 +228,7 @@ TEST(BodySurface, CellsOfAnySenseLookOutwards) {
                                   ids->GetId(0), ids->GetId(1), ids->GetId(2), ids->GetId(3)};
     box->GetCells()->ReplaceCellAtId(cell, 8, mirrored);
   }
-  const BodySurface surface = body_surface(*box, 0.01);
+  const BodySurface surface = surface_of(*box, 0.01);
   EXPECT_EQ(surface.open_edges, 0u);
   EXPECT_NEAR(surface.mesh.volume(), 1, 1e-12);
 }
@@ -254,7 +256,7 @@ TEST(BodySurface, TheBodyEndsWhereTheDataEnd) {
     of_cells->Fill(1);
     mesh->GetCellData()->AddArray(of_cells);
     c.spoil(*mesh, *vtkDoubleArray::SafeDownCast(mesh->GetPointData()->GetArray(tensor_array)), *of_cells);
-    const BodySurface surface = body_surface(*mesh, 0.01);
+    const BodySurface surface = surface_of(*mesh, 0.01);
     EXPECT_NEAR(surface.mesh.volume(), 1 - c.missing / 125.0, 1e-12);
     EXPECT_EQ(euler_characteristic(surface.mesh), c.euler);
     EXPECT_EQ(surface.open_edges, 0u);
@@ -264,7 +266,7 @@ TEST(BodySurface, TheBodyEndsWhereTheDataEnd) {
 TEST(BodySurface, SlabsHaveTopBottomAndWallsAlsoInHoles) {
   const auto plane = curvilinear({5, 5, 1}, [](const Vector3d& p) { return Vector3d(4 * p.x(), 4 * p.y(), 7); });
   const Grid ring = some_cells(*plane, [](vtkIdType i) { return i != 5 && i != 6 && i != 9 && i != 10; });
-  const BodySurface surface = body_surface(*slab_of(*ring, *flat_mesh(*ring), 0.5), 0.01);
+  const BodySurface surface = surface_of(*slab_of(*ring, *flat_mesh(*ring), 0.5), 0.01);
   EXPECT_EQ(surface.open_edges, 0u);
   EXPECT_EQ(euler_characteristic(surface.mesh), 0);
   EXPECT_NEAR(surface.mesh.volume(), 6, 1e-12);
@@ -273,7 +275,7 @@ TEST(BodySurface, SlabsHaveTopBottomAndWallsAlsoInHoles) {
 }
 
 TEST(BodySurface, ABoxCutsIt) {
-  const BodySurface ball = body_surface(*divided({VTK_QUADRATIC_HEXAHEDRON}, 6, to_ball), 1e-3);
+  const BodySurface ball = surface_of(*divided({VTK_QUADRATIC_HEXAHEDRON}, 6, to_ball), 1e-3);
   const TriangleMesh half = cut_to(ball.mesh, {Vector3d(0, -2, -2), Vector3d(2, 2, 2)});
   EXPECT_EQ(open_edges(half), 0u);
   EXPECT_NEAR(half.volume(), ball.mesh.volume() / 2, 1e-9);

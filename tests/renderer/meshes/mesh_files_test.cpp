@@ -256,6 +256,59 @@ TEST(Gltf, TextureCoordinatesMayBeIntegers) {
   }
 }
 
+// The extension's own example: the lower left quarter of the picture, turned by a quarter. Corners in the format's
+// axes, v down: (0, 0), (1, 0), (0, 1) become (0, 1), (0, 0.5), (0.5, 1).
+TEST(Gltf, PicturesOfTheBaseColourMove) {
+  std::string numbers(36, '\0');
+  for (const std::size_t corner : {1, 2}) numbers.replace(16 * corner, 4, std::string("\0\0\x80\x3f", 4));
+  numbers += std::string(24, '\0');  // Places of another picture.
+  for (const float place : {0, 0, 1, 0, 0, 1}) numbers.append(reinterpret_cast<const char*>(&place), sizeof place);
+  const std::string transform = R"("extensions": {"KHR_texture_transform": {"offset": [0, 1], "scale": [0.5, 0.5],
+      "rotation": 1.57079632679, "texCoord": 1}})";
+  using Places = std::vector<Eigen::Vector2f>;
+  for (const auto& [texture, expected] : {std::pair(transform, Places{{0, 0}, {0, 0.5F}, {0.5F, 0}}),
+                                          {R"("texCoord": 1)", Places{{0, 1}, {1, 1}, {0, 0}}},
+                                          {R"("texCoord": 0)", Places{{0, 1}, {0, 1}, {0, 1}}}}) {
+    const Temporary file("a.gltf", R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [
+      {"mesh": 0}], "extensionsRequired": ["KHR_texture_transform"], "images": [{"uri": "a.png"}], "textures": [
+      {"source": 0}], "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, )" +
+                                       texture + R"(}}}], "meshes": [{"primitives": [{"material": 0,
+      "attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 2}}]}], "buffers": [{"uri": "data:;base64,)" +
+                                       base64(numbers) + R"(", "byteLength": 84}], "bufferViews": [
+      {"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 48}], "accessors":
+      [{"bufferView": 0, "count": 3, "type": "VEC3", "componentType": 5126, "min": [0, 0, 0], "max": [0, 1, 1]},
+      {"bufferView": 1, "count": 3, "type": "VEC2", "componentType": 5126},
+      {"bufferView": 1, "byteOffset": 24, "count": 3, "type": "VEC2", "componentType": 5126}]})");
+    const Places places = read_mesh_with_normals(file.path(), {}).places;
+    ASSERT_EQ(places.size(), 3u) << texture;
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_LT((places[i] - expected[i]).norm(), 1e-6) << texture << i;
+  }
+}
+
+// Blender writes s and t, others u and v, of vertices; MeshLab texcoord, of the corners of faces.
+TEST(Ply, TextureCoordinatesOfVerticesAndOfCorners) {
+  using Places = std::vector<Eigen::Vector2f>;
+  const auto read = [](const std::string& of_vertex, const std::string& of_face, const std::string& rows) {
+    const Temporary file("a.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n" +
+                                      of_vertex + "property float z\nelement face 2\nproperty list uchar int " +
+                                      "vertex_indices\n" + of_face + "end_header\n" + rows);
+    return read_mesh_with_normals(file.path(), {});
+  };
+  for (const std::string& names : {"uv", "st"})
+    for (const char* prefix : {"", "texture_"}) {
+      std::string properties;
+      for (const char name : names) properties += std::string("property float ") + prefix + name + "\n";
+      EXPECT_EQ(read(properties, "", "0 0 0 0 0\n1 0 1 .5 0\n1 1 1 1 0\n0 1 0 1 0\n3 0 1 2\n3 0 2 3\n").places,
+                (Places{{0, 0}, {1, 0.5F}, {1, 1}, {0, 1}}))
+          << prefix << names;
+    }
+  const MeshWithNormals seam = read("", "property list uchar float texcoord\n",
+                                    "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 6 0 0 1 0 1 1\n3 0 2 3 6 0 0 .5 .5 0 1\n");
+  EXPECT_EQ(seam.places, (Places{{0, 0}, {1, 0}, {1, 1}, {0.5F, 0.5F}, {0, 1}}));  // Vertex 2 has two.
+  EXPECT_EQ(seam.mesh.triangles.size(), 2u);
+  EXPECT_TRUE(read("", "", "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n").places.empty());
+}
+
 TEST(Gltf, ExtensionsThatChangeTheShapeAreRefusedByName) {
   const Quantized kind{5122, 2, 32767};
   const std::string uri = "\"uri\": \"data:;base64," + base64(triangle_numbers(kind)) + "\", ";

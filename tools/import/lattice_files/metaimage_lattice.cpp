@@ -95,7 +95,7 @@ Eigen::Vector3i size_of(const HeaderLines& header) {
 
 }  // namespace
 
-Lattice open_metaimage(const Path& path) {
+Lattice open_metaimage(const Path& path, bool is_mask) {
   require_file(path);
   const HeaderLines header = header_lines({path, 0, false, 0}, '=', "ElementDataFile");
   if (header.text("ElementDataFile").empty())
@@ -103,8 +103,8 @@ Lattice open_metaimage(const Path& path) {
   Lattice lattice;
   lattice.size = size_of(header);
   const double channels = numbers_of(header, {"ElementNumberOfChannels"}, {1})[0];
-  if (channels != 3 && channels != 6 && channels != 9)
-    fail(path, fmt::format("has {} channels: a tensor has six or nine, a vector three", channels));
+  if (!is_component_count(channels, is_mask))
+    fail(path, fmt::format("has {} channels: {}", channels, component_words(is_mask)));
   lattice.components = static_cast<int>(channels);
   if (lattice.components == 6) lattice.usual_order = TensorOrder::fsl;  // itk::SymmetricSecondRankTensor
   lattice.to_world = Vector3d(-1, -1, 1).asDiagonal() * to_lps(header);

@@ -42,10 +42,8 @@ std::vector<std::int64_t> extents_of(const HeaderLines& header, bool is_mask) {
     extents.push_back(static_cast<std::int64_t>(extent));
   }
   if (is_mask && extents.size() == 3) extents.push_back(1);
-  if (is_mask && extents.size() == 4 && extents[3] == 1) return extents;
-  if (extents.size() != 4 || (extents[3] != 3 && extents[3] != 6 && extents[3] != 9))
-    fail(header.path, "its size is " + escaped(header.text("dim")) +
-                          ": a tensor has four axes, the last one of six or nine volumes, a vector three");
+  if (extents.size() != 4 || !is_component_count(static_cast<double>(extents[3]), is_mask))
+    fail(header.path, "its size is " + escaped(header.text("dim")) + ": " + component_words(is_mask));
   return extents;
 }
 
@@ -116,7 +114,9 @@ Eigen::Affine3d to_world(const HeaderLines& header, const Eigen::Vector3i& size)
   return transform;
 }
 
-Lattice open_image(const Path& path, bool is_mask) {
+}  // namespace
+
+Lattice open_mrtrix(const Path& path, bool is_mask) {
   require_file(path);
   const HeaderLines header = header_lines({path, 0, is_packed(path), 0}, ':', "END");
   if (header.text("file").empty()) fail(path, "is not an image of MRtrix, or cut off in its header");
@@ -136,10 +136,5 @@ Lattice open_image(const Path& path, bool is_mask) {
   lattice.read_slice = slices_of(std::move(voxels), lattice.size, lattice.components);
   return lattice;
 }
-
-}  // namespace
-
-Lattice open_mrtrix(const Path& path) { return open_image(path, false); }
-Lattice open_mrtrix_mask(const Path& path) { return open_image(path, true); }
 
 }  // namespace tensorray

@@ -94,14 +94,14 @@ bool has_matrices(const nifti_image& image) {
 /// Counts the components along the fourth axis, or along the fifth, which the format prescribes for vectors and
 /// matrices, or along both.
 int component_count(const nifti_image& image, const std::filesystem::path& path, bool is_mask) {
-  if (has_matrices(image)) return 9;
+  if (!is_mask && has_matrices(image)) return 9;
   const auto extent = [&](int axis) { return axis <= image.dim[0] ? image.dim[axis] : 1; };
   const std::int64_t four = extent(4), five = extent(5);
   const std::int64_t count = four > 1 ? four : five;
-  if (is_mask && count == 1) return 1;
-  if ((count != 3 && count != 6 && count != 9) || four * five != count || extent(6) != 1 || extent(7) != 1)
-    fail(path, fmt::format("its size is {} x {} x {} x {} x {}: a tensor has six or nine volumes, a vector three",
-                           extent(1), extent(2), extent(3), four, five));
+  if (!is_component_count(static_cast<double>(count), is_mask) || four * five != count || extent(6) != 1 ||
+      extent(7) != 1)
+    fail(path, fmt::format("its size is {} x {} x {} x {} x {}: {}", extent(1), extent(2), extent(3), four, five,
+                           component_words(is_mask)));
   return static_cast<int>(count);
 }
 
@@ -151,7 +151,9 @@ std::filesystem::path header_of(const std::filesystem::path& path) {
   return name;
 }
 
-Lattice open_volumes(const std::filesystem::path& given, bool is_mask) {
+}  // namespace
+
+Lattice open_nifti(const std::filesystem::path& given, bool is_mask) {
   const std::filesystem::path path = header_of(given);
   const Image image = read_header(path);
   Lattice lattice;
@@ -180,10 +182,5 @@ Lattice open_volumes(const std::filesystem::path& given, bool is_mask) {
   lattice.read_slice = slices_of(std::move(voxels), lattice.size, lattice.components);
   return lattice;
 }
-
-}  // namespace
-
-Lattice open_nifti(const std::filesystem::path& path) { return open_volumes(path, false); }
-Lattice open_nifti_mask(const std::filesystem::path& path) { return open_volumes(path, true); }
 
 }  // namespace tensorray

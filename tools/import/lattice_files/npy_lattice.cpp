@@ -25,6 +25,7 @@ namespace tensorray {
 namespace {
 
 struct Header {
+  std::string type;  ///< As number_type takes it.
   int number_bytes = 0;
   ByteOrder order = host_byte_order();
   bool fortran = false;  ///< The first index runs fastest.
@@ -78,16 +79,18 @@ std::vector<std::size_t> shape_of(const std::string& text, const std::filesystem
   return shape;
 }
 
-Header read_header(std::ifstream& file, const std::filesystem::path& path) {
+Header read_header(std::ifstream& file, const std::filesystem::path& path, bool is_mask) {
   Header header;
   const std::string dictionary = read_dictionary(file, path, header);
   const std::string descr = value_of(dictionary, "descr", path);
   const auto one_of = [&](std::size_t i, const std::string& characters) {
     return i < descr.size() && characters.find(descr[i]) != std::string::npos;
   };
-  const bool real = one_of(0, "'") && one_of(1, "<>=|") && one_of(2, "f") && one_of(3, "248") && one_of(4, "'");
-  if (!real) fail(path, "its numbers are not float16, float32 or float64: save array.astype(\"float32\")");
+  const bool real = one_of(2, "f") && one_of(3, "248"), whole = is_mask && one_of(2, "biu") && one_of(3, "1248");
+  if (!one_of(0, "'") || !one_of(1, "<>=|") || !(real || whole) || !one_of(4, "'"))
+    fail(path, "its numbers are not float16, float32 or float64: save array.astype(\"float32\")");
   header.number_bytes = descr[3] - '0';
+  header.type = fmt::format("{}{}", real ? "float" : descr[2] == 'i' ? "int" : "uint", 8 * header.number_bytes);
   if (descr[1] == '<') header.order = ByteOrder::little;
   if (descr[1] == '>') header.order = ByteOrder::big;
   header.fortran = value_of(dictionary, "fortran_order", path).compare(0, 4, "True") == 0;
@@ -95,8 +98,10 @@ Header read_header(std::ifstream& file, const std::filesystem::path& path) {
   return header;
 }
 
-std::size_t component_count(const Header& header, const std::filesystem::path& path) {
+std::size_t component_count(const Header& header, const std::filesystem::path& path, bool is_mask) {
   const auto& shape = header.shape;
+  if (is_mask && shape.size() == 3) return 1;
+  if (is_mask) fail(path, fmt::format("its shape is ({}): a mask is (nz, ny, nx)", fmt::join(shape, ", ")));
   if (shape.size() == 5 && shape[3] == 3 && shape[4] == 3) return 9;
   if (shape.size() == 4 && (shape[3] == 9 || shape[3] == 6 || shape[3] == 3)) return shape[3];
   fail(path, fmt::format("its shape is ({}): a field of tensors is (nz, ny, nx, 3, 3), (nz, ny, nx, 9) or (nz, ny, nx, "
@@ -116,12 +121,12 @@ void check_size(const Header& header, const std::filesystem::path& path) {
 
 }  // namespace
 
-Lattice open_npy(const std::filesystem::path& path) {
+Lattice open_npy(const std::filesystem::path& path, bool is_mask) {
   require_file(path);
   std::ifstream file(path, std::ios::binary);
   if (!file) fail(path, "cannot be read");
-  const Header header = read_header(file, path);
-  const std::size_t components = component_count(header, path);
+  const Header header = read_header(file, path, is_mask);
+  const std::size_t components = component_count(header, path, is_mask);
   check_size(header, path);
   Lattice lattice;
   for (std::size_t i = 0; i < 3; ++i) lattice.size[static_cast<int>(i)] = static_cast<int>(header.shape[2 - i]);
@@ -129,7 +134,7 @@ Lattice open_npy(const std::filesystem::path& path) {
   if (components == 9) lattice.order = TensorOrder::full;
   const std::int64_t n = lattice.components, x = lattice.size.x(), y = lattice.size.y(), z = lattice.size.z();
   RawVoxels voxels;
-  voxels.type = number_type(path, fmt::format("float{}", 8 * header.number_bytes), "");
+  voxels.type = number_type(path, header.type, "");
   voxels.order = header.order;
   voxels.strides = {n, n * x, n * x * y, 1};
   if (header.fortran) voxels.strides = {z * y, z, 1, z * y * x};

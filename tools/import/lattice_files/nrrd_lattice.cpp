@@ -99,12 +99,14 @@ bool is_space(const Nrrd& nrrd, unsigned int axis) {
   return kind == nrrdKindSpace || kind == nrrdKindDomain;
 }
 
-/// The component axis is the one that is not spatial; if the file does not tell, it is the first axis.
-Axes find_axes(const Nrrd& nrrd, const std::filesystem::path& path) {
+/// The component axis is the one that is not spatial; if the file does not tell, it is the first axis. A mask may have
+/// none.
+Axes find_axes(const Nrrd& nrrd, const std::filesystem::path& path, bool is_mask) {
+  if (is_mask && nrrd.dim == 3 && (nrrd.spaceDim == 0 || nrrd.spaceDim == 3)) return {3, {0, 1, 2}};
   if (nrrd.dim != 4 || (nrrd.spaceDim != 0 && nrrd.spaceDim != 3))
-    fail(path, fmt::format("has {} axes in {} dimensions of space: a field of tensors has three axes and one of "
-                           "components",
-                           nrrd.dim, nrrd.spaceDim));
+    fail(path,
+         fmt::format("has {} axes in {} dimensions of space: {}", nrrd.dim, nrrd.spaceDim,
+                     is_mask ? component_words(true) : "a field of tensors has three axes and one of components"));
   std::vector<unsigned int> components, space;
   for (unsigned int axis = 0; axis < 4; ++axis) (is_space(nrrd, axis) ? space : components).push_back(axis);
   if (components.size() == 4 && nrrd.spaceDim == 0) return {0, {1, 2, 3}};
@@ -113,7 +115,9 @@ Axes find_axes(const Nrrd& nrrd, const std::filesystem::path& path) {
   return {components[0], {space[0], space[1], space[2]}};
 }
 
-Components find_components(const NrrdAxisInfo& axis, const std::filesystem::path& path) {
+Components find_components(const NrrdAxisInfo& axis, const std::filesystem::path& path, bool is_mask) {
+  if (is_mask && axis.size > 1) fail(path, fmt::format("has {} components: {}", axis.size, component_words(true)));
+  if (is_mask) return {};
   const std::pair<int, Components> kinds[] = {{nrrdKind3DSymMatrix, {false, TensorOrder::fsl}},
                                               {nrrdKind3DMaskedSymMatrix, {true, TensorOrder::fsl}},
                                               {nrrdKind3DMatrix, {false, TensorOrder::full}},
@@ -194,14 +198,14 @@ RawVoxels voxels_of(NrrdPointer nrrd, const Axes& axes, const std::filesystem::p
 
 }  // namespace
 
-Lattice open_nrrd(const std::filesystem::path& path) {
+Lattice open_nrrd(const std::filesystem::path& path, bool is_mask) {
   NrrdPointer nrrd = read_nrrd(path);
-  const Axes axes = find_axes(*nrrd, path);
-  const Components components = find_components(nrrd->axis[axes.component], path);
+  const Axes axes = find_axes(*nrrd, path, is_mask);
+  const Components components = find_components(nrrd->axis[axes.component], path, is_mask);
   Lattice lattice;
   for (int i = 0; i < 3; ++i)
     lattice.size[i] = static_cast<int>(nrrd->axis[axes.space[static_cast<std::size_t>(i)]].size);
-  lattice.components = static_cast<int>(nrrd->axis[axes.component].size);
+  lattice.components = is_mask ? 1 : static_cast<int>(nrrd->axis[axes.component].size);
   lattice.masked = components.masked;
   lattice.order = components.order;
   lattice.to_world = to_world(*nrrd, axes, path);

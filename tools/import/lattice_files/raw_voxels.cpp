@@ -84,7 +84,7 @@ const NumberType number_types[] = {
     {"int8", 1, number<std::int8_t>},     {"uint8", 1, number<std::uint8_t>},   {"int16", 2, number<std::int16_t>},
     {"uint16", 2, number<std::uint16_t>}, {"int32", 4, number<std::int32_t>},   {"uint32", 4, number<std::uint32_t>},
     {"int64", 8, number<std::int64_t>},   {"uint64", 8, number<std::uint64_t>}, {"float16", 2, number<Eigen::half>},
-    {"float32", 4, number<float>},        {"float64", 8, number<double>}};
+    {"float32", 4, number<float>},        {"float64", 8, number<double>},       {"bit", 0, nullptr}};
 
 }  // namespace
 
@@ -166,7 +166,7 @@ std::shared_ptr<const char> read_numbers(const std::filesystem::path& path, cons
   const std::uintmax_t bytes = std::filesystem::file_size(place.file, none);
   if (none || !std::filesystem::is_regular_file(place.file, none))
     fail(path, "its data file " + place.file.string() + " is missing");
-  const double needed = size.cast<double>().prod() * components * type.bytes;
+  const double needed = std::ceil(size.cast<double>().prod() * components * (type.bytes > 0 ? type.bytes : 1.0 / 8));
   const double held = static_cast<double>(bytes) - static_cast<double>(place.offset);
   if (needed + static_cast<double>(place.skipped) > held * (place.is_compressed ? max_expansion : 1))
     fail(path, fmt::format("announces {:.0f} bytes of numbers, and holds no more than {:.0f}: cut off, or a damaged "
@@ -190,8 +190,9 @@ std::function<void(int z, double* values)> slices_of(RawVoxels voxels, const Eig
           const int component = held->by_columns ? c % 3 * 3 + c / 3 : c;
           const std::int64_t index =
               held->first + x * x_stride + y * y_stride + z * z_stride + component * component_stride;
-          const char* const bytes = held->bytes.get() + index * held->type.bytes;
-          *values++ = held->slope * held->type.read(bytes, held->order) + held->intercept;
+          const char* const bytes = held->bytes.get() + (held->type.read ? index * held->type.bytes : index / 8);
+          const double number = held->type.read ? held->type.read(bytes, held->order) : *bytes >> (7 - index % 8) & 1;
+          *values++ = held->slope * number + held->intercept;
         }
     // They need not stay in memory: the system has the file.
     if (const auto* const mapping = std::get_deleter<Mapping>(held->bytes))

@@ -26,9 +26,18 @@ void require_file(const std::filesystem::path& path);
 void require_invertible(const std::filesystem::path& path, const Eigen::Affine3d& transform,
                         const std::string& is_what);
 
+/// How many numbers there are at each voxel, in words for errors, and whether a file may have so many.
+inline bool is_component_count(double count, bool is_mask) {
+  return is_mask ? count == 1 : count == 3 || count == 6 || count == 9;
+}
+inline const char* component_words(bool is_mask) {
+  return is_mask ? "a mask has one number at each voxel"
+                 : "a tensor has six or nine numbers at each voxel, a vector three";
+}
+
 struct NumberType {
   const char* name = nullptr;
-  int bytes = 0;
+  int bytes = 0;  ///< 0: bits, of which the first is the highest of a byte (masks of MRtrix).
   double (*read)(const char* bytes, ByteOrder order) = nullptr;
 };
 

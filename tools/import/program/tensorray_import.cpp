@@ -54,10 +54,8 @@ struct ImportOptions {
   std::string array, gradient_of, strain_of, viscous_stress_of, order, frame, cells = "linear", error, rounding;
   std::vector<int> resolution;
   std::vector<double> voxel_size, bounds, origin;
-  double thickness = 0, finest = 0;
-  int levels = 0;
   std::filesystem::path output, boundary;
-  std::string name, units, mirror, steps = "last";
+  std::string name, units, mirror, steps = "last", called;
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
   bool no_surface = false, half = false, quiet = false, silent = false, tells_progress = false;
 };
@@ -68,16 +66,6 @@ std::optional<Value> named(const std::string& name, const std::vector<std::pair<
   for (const auto& [text, value] : table)
     if (text == name) return value;
   return {};
-}
-
-/// A part as 1% or 0.01. @throw std::invalid_argument
-double part_of(const std::string& text, const std::string& option) {
-  double value = 0;
-  const bool is_percent = !text.empty() && text.back() == '%';
-  if (!CLI::detail::lexical_cast(is_percent ? text.substr(0, text.size() - 1) : text, value) || !(value >= 0) ||
-      !(value *= is_percent ? 0.01 : 1.0, value <= 1))
-    throw std::invalid_argument(option + " " + escaped(text) + ": give a part, as 1% or 0.01");
-  return value;
 }
 
 ImportSettings settings_of(const ImportOptions& options) {
@@ -93,13 +81,10 @@ ImportSettings settings_of(const ImportOptions& options) {
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
   if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
-  if (options.levels > 0) settings.sampling.levels = options.levels;
-  if (options.finest > 0) settings.sampling.finest = options.finest;
   if (!options.error.empty()) settings.sampling.error = part_of(options.error, "--error");
   if (!options.rounding.empty()) settings.sampling.rounding = part_of(options.rounding, "--rounding");
-  if (options.finest > 0 && options.voxel_size.size() == 1 && options.finest > options.voxel_size[0])
+  if (options.voxel_size.size() == 1 && settings.sampling.finest > options.voxel_size[0])
     throw std::invalid_argument("--finest must not be larger than --voxel-size, which is the coarsest");
-  if (options.thickness > 0) settings.thickness = options.thickness;
   if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
   if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
   if (options.resolution.size() == 2) throw std::invalid_argument("--resolution needs one number, or three: x y z");
@@ -379,16 +364,16 @@ void add_where(CLI::App& command, ImportOptions& options) {
       .add_option("--origin", options.origin, "World x y z of the centre of the first voxel of .npy (default: 0 0 0)")
       ->expected(3);
   command
-      .add_option("--thickness", options.thickness,
+      .add_option("--thickness", options.settings.thickness,
                   "Thickness of the slab that a flat mesh becomes (default: a typical edge of its cells)")
       ->check(positive);
   command
-      .add_option("--levels", options.levels,
+      .add_option("--levels", options.settings.sampling.levels,
                   "At most so many sizes of voxels, of which each is half of the one before, as fine as the cells of "
                   "the mesh ask (default: 4)")
       ->check(CLI::Range(1, max_levels));
   command
-      .add_option("--finest", options.finest,
+      .add_option("--finest", options.settings.sampling.finest,
                   "The least edge of a voxel (default: what the levels reach); without --voxel-size, which is the "
                   "coarsest, the levels are counted from it")
       ->check(positive)
@@ -468,8 +453,10 @@ void add_import_options(CLI::App& program, Progress& progress) {
   program.add_flag("-q,--quiet", options->quiet, "No progress bar");
   program.add_flag("--tell-progress", options->tells_progress)->group("");  // For the Python package.
   program.add_flag("--silent", options->silent)->group("");                 // For commands that print nothing else.
+  program.add_option("--called", options->called)->group("");  // The output, for commands that do not keep it.
   program.callback([options, &progress] {
     if (options->silent && !std::freopen("/dev/null", "w", stdout)) throw std::runtime_error("/dev/null is missing");
+    if (!options->called.empty()) tell_as(options->output.string(), options->called);
     import(*options, progress);
   });
 }

@@ -130,7 +130,8 @@ void remove_orphans(const TensorBlocks& before, TensorBlocks& blocks) {
 /// did not set are no more than a few times those of level 0 at most.
 void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settings, const Progress& progress,
                       TensorGrid& grid, SamplingReport& report) {
-  constexpr double rounded_one = 1 + 1e-6, bricks_of_all = 1 << 18, bricks_of_chosen = 1 << 11;
+  constexpr double fitted = 0.7;  // Voxels that fit in the box are a little smaller than they were meant.
+  constexpr double bricks_of_all = 1 << 18, bricks_of_chosen = 1 << 11;
   constexpr int largest = 1 << 28;  // Of a lattice along an axis.
   if (settings.flat_axis >= 0) return;
   const bool is_chosen = settings.resolution.index() == 0 && !settings.finest;
@@ -141,7 +142,7 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
   BlockPlaces places(lattice.size);
   std::size_t bricks = 0;
   for (int level = 1; level < settings.levels.value_or(max_levels); ++level) {
-    if (lattice.size.maxCoeff() > largest || settings.finest.value_or(0) > 0.5 * rounded_one * lattice.voxel.minCoeff())
+    if (lattice.size.maxCoeff() > largest || fitted * settings.finest.value_or(0) > 0.5 * lattice.voxel.maxCoeff())
       return;
     const MeshSource source = on_lattice(coarsest, lattice);
     const TensorBlocks& blocks = level == 1 ? grid.blocks : grid.finer.back();

@@ -18,9 +18,9 @@ namespace tensorray {
 
 struct SamplingSettings {
   /// The number of voxels along the longest edge (int), the numbers along x, y, z (>= 2 each), or the edge of a voxel
-  /// (double). If none is given, a voxel is about as large as the median cell, with at most 2^21 voxels; on level 0 it
-  /// is larger by a power of two where that fits the large cells. Along each axis it is a little smaller, so that
-  /// voxels are on both faces of the box, and at least five across it.
+  /// (double). If none is given, a voxel is about as large as the median cell, with at most 2^21 voxels, of which at
+  /// least five are across the box; on level 0 it is larger by a power of two where that fits the large cells. Along
+  /// each axis, all of them are a little smaller, so that voxels are on both faces of the box.
   std::variant<std::monostate, int, Eigen::Vector3i, double> resolution;
   std::optional<int> levels;     ///< At most so many, 1 to max_levels; none: max_levels.
   std::optional<double> finest;  ///< The least edge of a voxel; none: that of the last level.
@@ -56,7 +56,7 @@ struct SamplingReport {
 /// Samples the tensors of with_tensors at the voxels of a lattice. A voxel is active if its centre is in a cell whose
 /// tensor is finite; where cells overlap, the cell with the lowest index counts. Where layers overlap (layer_array),
 /// the smallest cell with a finite tensor counts, and a voxel takes its value from one layer. Voxels within 1e-6 of the
-/// mesh's diagonal of a face count as inside. The lattice is centred in the box as far as the box extends.
+/// mesh's diagonal of a face count as inside. The lattice is from face to face of the box.
 ///
 /// A voxel takes the tensor at its centre, interpolated in the cell that contains it (it is NaN if a point with a
 /// weight has NaN), or the cell's own if the mesh has tensors at cells alone. Where cells are thinner than voxels, it

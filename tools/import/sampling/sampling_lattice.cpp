@@ -52,16 +52,11 @@ double typical_edge(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& bo
 /// Cells that are a little smaller than voxels are as large.
 constexpr double rounded_size = 1.02;
 
-/// Voxels that fit along edges, from one end. Doubles, because the numbers may exceed all integers.
-Vector3d voxels_along(const Vector3d& edges, double voxel) {
-  constexpr double rounding = 1e-6;  // keeps a last voxel that is beyond the end only by rounding
-  return (edges.array() / voxel + rounding).floor() + 1;
-}
-
-/// Voxels of at most an edge whose first and last centres are on the faces of a box, and at least five across it, so
-/// that the field of a thin body reaches its faces.
-Vector3d voxels_across(const Vector3d& edges, double voxel) {
-  constexpr double rounding = 1e-6, least = 4;
+/// Voxels of at most an edge whose first and last centres are on the faces of a box, so that the field reaches them.
+/// Doubles, because the numbers may exceed all integers.
+/// @param least  Edges along an axis: a thin body gets four.
+Vector3d voxels_across(const Vector3d& edges, double voxel, double least = 4) {
+  constexpr double rounding = 0.01;  // Of an edge, as sizes are given with a few digits.
   return (edges.array() / voxel - rounding).ceil().max(least) + 1;
 }
 
@@ -107,7 +102,7 @@ double doubled(double voxel, const Solid& solid, const AlignedBox3d& box, const 
 /// Of adaptive refinement: the voxels of level 0 are the largest cells, if these are not too many.
 double largest_cell(const Solid& solid, const AlignedBox3d& box) {
   double voxel = *std::max_element(solid.edges.begin(), solid.edges.end());
-  while (!is_small(voxels_along(box.sizes(), voxel))) voxel *= 2;
+  while (!is_small(voxels_across(box.sizes(), voxel, 1))) voxel *= 2;
   return voxel;
 }
 
@@ -206,16 +201,14 @@ SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const Sam
   if (settings.flat_axis >= 0) edges[settings.flat_axis] = 0;
   const double longest = edges.maxCoeff();
   Vector3d size;
-  const auto set_voxel = [&](double voxel) {
-    size = voxels_along(box.sizes(), voxel);
-    lattice.voxel.setConstant(voxel);
+  const auto set_voxel = [&](double voxel, double least = 1) {
+    size = voxels_across(box.sizes(), voxel, least);
+    lattice.voxel = box.sizes().cwiseQuotient(size - Vector3d::Ones());
   };
   const auto choose = [&] {
     if (settings.finest) return set_voxel(std::min(doubled(*settings.finest, solid, box, settings), longest));
     if (settings.levels != 1 && is_adaptive(solid)) return set_voxel(std::min(largest_cell(solid, box), longest));
-    const double voxel = doubled(chosen_voxel(mesh, solid, box, settings), solid, box, settings);
-    size = voxels_across(box.sizes(), voxel);
-    lattice.voxel = box.sizes().cwiseQuotient(size - Vector3d::Ones());
+    set_voxel(doubled(chosen_voxel(mesh, solid, box, settings), solid, box, settings), 4);
   };
   std::visit(Overloaded{[&](std::monostate) { choose(); },
                         [&](int count) {
@@ -245,7 +238,6 @@ SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const Sam
                     "a larger --voxel-size or a lower --resolution",
                     size.x(), size.y(), size.z()));
   lattice.size = size.cast<int>();
-  // Centre the voxels, so that both sides have the same rest.
   lattice.origin = box.center() - 0.5 * (lattice.voxel.array() * (size.array() - 1)).matrix();
   return lattice;
 }

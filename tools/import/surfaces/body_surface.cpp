@@ -31,12 +31,16 @@ ChooseFaces with_data(vtkDataSet& mesh) {
 
 }  // namespace
 
-BodySurface body_surface(vtkDataSet& mesh, double tolerance) {
-  const MeshPoints points = points_of(mesh);
-  std::vector<CellFace> faces = outer_faces(mesh, points, with_data(mesh));
+BodyFaces body_faces(vtkDataSet& mesh) {
+  BodyFaces body{points_of(mesh), {}, 0};
+  body.faces = outer_faces(mesh, body.points, with_data(mesh));
+  body.inner = remove_crossed_faces(body.faces, body.points);
+  return body;
+}
+
+BodySurface body_surface(vtkDataSet& mesh, const BodyFaces& faces, double tolerance) {
   BodySurface surface;
-  surface.inner_faces = remove_crossed_faces(faces, points);
-  FaceTriangles triangles = triangles_of(mesh, points, std::move(faces), tolerance);
+  FaceTriangles triangles = triangles_of(mesh, faces.points, faces.faces, tolerance);
   surface.mesh = std::move(triangles.mesh);
   const std::vector<char> inner = inner_triangles(surface.mesh);
   std::set<std::size_t> inner_faces;
@@ -45,7 +49,7 @@ BodySurface body_surface(vtkDataSet& mesh, double tolerance) {
       inner_faces.insert(triangles.face_of[i]);
     else
       surface.area += area_of(surface.mesh, i).norm();
-  surface.inner_faces += inner_faces.size();
+  surface.inner_faces = faces.inner + inner_faces.size();
   surface.open_edges = open_edges(surface.mesh);
   return surface;
 }

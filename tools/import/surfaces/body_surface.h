@@ -5,8 +5,7 @@
 #include <cstddef>
 
 #include "base/geometry/triangle_mesh.h"
-
-class vtkDataSet;
+#include "tools/import/meshes/mesh_faces.h"
 
 namespace tensorray {
 
@@ -21,9 +20,17 @@ struct BodySurface {
   std::size_t open_edges = 0;  ///< Of polyhedra whose faces do not close.
 };
 
+/// The faces on the outside, which are most of the work of a surface.
+struct BodyFaces {
+  MeshPoints points;
+  std::vector<CellFace> faces;
+  std::size_t inner = 0;  ///< Those that have been removed.
+};
+
 /// The outside of all three-dimensional cells that carry data, with its holes: those that MeshCell loads, whose tensors
 /// (with_tensors; if there are any) are finite at the cell and at all its points; as triangles_of with this tolerance.
 /// Uses all threads; the result does not depend on their number.
-BodySurface body_surface(vtkDataSet& mesh, double tolerance);
+BodyFaces body_faces(vtkDataSet& mesh);
+BodySurface body_surface(vtkDataSet& mesh, const BodyFaces& faces, double tolerance);
 
 }  // namespace tensorray
