@@ -25,8 +25,6 @@ struct CellBox {
   double extent[3];  ///< Voxels of level 0.
   double scale;      ///< Cells in a voxel of level 0.
   std::int32_t last[3];
-  DifferenceSampler* sampler;
-  DifferenceSampler::Cell (*find)(DifferenceSampler& sampler, const std::int32_t (&cell)[3]);
 };
 
 }  // namespace
@@ -95,7 +93,7 @@ HWY_INLINE void sum_cell(const float* first, const F (&weights)[3][4], F& a, F& 
   }
 }
 
-void sample_steps(const CellBox& box, RaySteps& steps) {
+void sample_steps(const CellBox& box, DifferenceSampler& sampler, RaySteps& steps) {
   const Floats d;
   const Ints ints;
   for (int point = 0; point < 2; ++point)
@@ -111,7 +109,7 @@ void sample_steps(const CellBox& box, RaySteps& steps) {
         for (int axis = 0; axis < 3; ++axis)
           same = hn::And(same, hn::RebindMask(d, hn::Eq(hn::Load(ints, cell[axis]), hn::Set(ints, of[axis]))));
         left = hn::AndNot(same, left);
-        const DifferenceSampler::Cell found = box.find(*box.sampler, of);
+        const DifferenceSampler::Cell found = sampler.find(of);
         if (!found.first) continue;
         F weights[3][4], cell_a, cell_b;
         for (int axis = 0; axis < 3; ++axis)
@@ -214,9 +212,7 @@ void DifferenceSampler::sample(RaySteps& steps) {
     box.extent[axis] = field_.voxels().sizes()[axis];
     box.last[axis] = std::max(static_cast<int>(box.extent[axis] * box.scale) - 1, 0);
   }
-  box.sampler = this;
-  box.find = [](DifferenceSampler& sampler, const std::int32_t(&cell)[3]) { return sampler.find(cell); };
-  HWY_DYNAMIC_DISPATCH(sample_steps)(box, steps);
+  HWY_DYNAMIC_DISPATCH(sample_steps)(box, *this, steps);
 }
 
 }  // namespace tensorray

@@ -10,6 +10,7 @@ namespace {
 
 using Eigen::Matrix4d;
 using Eigen::Vector3d;
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 /// What elements do to (S0, S1, S2, −S3) of light of one wavelength (nm).
 Matrix4d mueller_matrix(const std::vector<Element>& elements, double wavelength) {
@@ -30,15 +31,18 @@ Matrix4d mueller_matrix(const std::vector<Element>& elements, double wavelength)
 
 bool is_polarizer(const Element& element) { return element.kind == ElementKind::polarizer; }
 
-/// What elements behind the specimen show, by a row of their matrix.
-Analysis analysis(const Arrangement& arrangement, double wavelength, const Eigen::RowVector4d& row) {
-  const bool is_polarized = last_polarizer(arrangement.before) || last_polarizer(arrangement.after);
-  const double greatest = is_polarized ? 0.5 : 1;  // Of parallel polarisers.
-  const Eigen::Vector4d in = mueller_matrix(arrangement.before, wavelength).col(0) / greatest;
-  return {in[0] * row[0], row.tail<3>().transpose() * in.tail<3>().transpose()};
-}
-
 }  // namespace
+
+const std::vector<NamedArrangement>& named_arrangements() {
+  const auto P = [](double angle) { return Element{ElementKind::polarizer, angle}; };
+  const auto quarter = [](double angle) { return Element{ElementKind::quarter_wave, angle}; };
+  static const std::vector<NamedArrangement> all{{"circular", {{P(0), quarter(45)}, {quarter(-45), P(90)}}},
+                                                 {"circular_light", {{P(0), quarter(45)}, {quarter(-45), P(0)}}},
+                                                 {"plane", {{P(0)}, {P(90)}}},
+                                                 {"plane_light", {{P(0)}, {P(0)}}},
+                                                 {"tint", {{P(0), {ElementKind::retarder, 45, 550}}, {P(90)}}}};
+  return all;
+}
 
 const Element* first_polarizer(const std::vector<Element>& elements) {
   const auto found = std::find_if(elements.begin(), elements.end(), is_polarizer);
@@ -57,16 +61,28 @@ Arrangement turned(Arrangement arrangement, double angle, double analyzer) {
   return arrangement;
 }
 
-Analysis analysis_of(const Arrangement& arrangement, double wavelength) {
-  return analysis(arrangement, wavelength, mueller_matrix(arrangement.after, wavelength).row(0));
+MeanLight light_of(const Eigen::Quaterniond& unitary) {
+  MeanLight light = MeanLight::Ones();
+  Eigen::Map<RowMatrix3d>(light.data()) = unitary.toRotationMatrix();
+  return light;
 }
 
-std::array<Analysis, 4> stokes_of(const Arrangement& arrangement, double wavelength) {
-  std::vector<Element> kept = arrangement.after;
-  if (const Element* const last = last_polarizer(kept)) kept.erase(kept.begin() + (last - kept.data()));
-  const Matrix4d after = mueller_matrix(kept, wavelength);
-  const auto parameter = [&](int i) { return analysis(arrangement, wavelength, (i == 3 ? -1 : 1) * after.row(i)); };
-  return {parameter(0), parameter(1), parameter(2), parameter(3)};
+std::array<MeanLight, 5> analyses_of(const Arrangement& arrangement, double wavelength) {
+  const Element* const last = last_polarizer(arrangement.after);
+  const double greatest = last || last_polarizer(arrangement.before) ? 0.5 : 1;  // Of parallel polarisers.
+  const Eigen::Vector4d in = mueller_matrix(arrangement.before, wavelength).col(0) / greatest;
+  std::vector<Element> others = arrangement.after;
+  if (last) others.erase(others.begin() + (last - arrangement.after.data()));
+  Eigen::Matrix<double, 5, 4> rows;
+  rows << mueller_matrix(arrangement.after, wavelength).row(0), mueller_matrix(others, wavelength);
+  rows.row(4) *= -1;
+  std::array<MeanLight, 5> analyses;
+  for (int i = 0; i < 5; ++i) {
+    MeanLight& analysis = analyses[static_cast<std::size_t>(i)];
+    Eigen::Map<RowMatrix3d>(analysis.data()) = rows.row(i).tail<3>().transpose() * in.tail<3>().transpose();
+    analysis[9] = in[0] * rows(i, 0);
+  }
+  return analyses;
 }
 
 EquivalentRetarder equivalent_retarder(const Eigen::Quaterniond& unitary) {

@@ -24,6 +24,13 @@ struct Arrangement {
   std::vector<Element> before, after;
 };
 
+/// The arrangements that have names in scene files; the first one is the default.
+struct NamedArrangement {
+  const char* name;
+  Arrangement elements;
+};
+const std::vector<NamedArrangement>& named_arrangements();
+
 /// The first, or the last, polariser of a list; null if it has none.
 const Element* first_polarizer(const std::vector<Element>& elements);
 const Element* last_polarizer(const std::vector<Element>& elements);
@@ -35,22 +42,17 @@ Arrangement turned(Arrangement arrangement, double angle, double analyzer);
 /// (w, x, y, z); products of matrices are products of quaternions, and its rotation turns the vector (S1, S2, −S3) of
 /// Stokes' parameters. S3 > 0 is light that turns clockwise for who faces it.
 ///
-/// What is seen of light of one wavelength, of which R is the mean rotation. Light without polarisation comes in.
-struct Analysis {
-  double through;               ///< What passes, whatever R is, ...
-  Eigen::Matrix3d by_rotation;  ///< ... and for each component of R.
+/// The mean light of many ways through a specimen, for its Mueller matrix: the nine components of the mean rotation R,
+/// row by row, and the part of the light that nothing stops (of which R is a part, too).
+using MeanLight = Eigen::Matrix<double, 10, 1>;
 
-  /// Power; 1 is what parallel polarisers let through without a specimen. @param lit  The part of the light that is not
-  /// stopped; R has been multiplied by it.
-  double power(const Eigen::Matrix3d& R, double lit = 1) const {
-    return lit * through + by_rotation.cwiseProduct(R).sum();
-  }
-};
+/// The light of one way.
+MeanLight light_of(const Eigen::Quaterniond& unitary);
 
-Analysis analysis_of(const Arrangement& arrangement, double wavelength);
-
-/// The same for Stokes' parameters S0 to S3 of the light on the last polariser.
-std::array<Analysis, 4> stokes_of(const Arrangement& arrangement, double wavelength);
+/// What is seen of light of one wavelength that comes in without polarisation: the products of each of these with
+/// MeanLight are the power (1 is what parallel polarisers let through without a specimen), and Stokes' parameters S0 to
+/// S3 of the light on the last polariser.
+std::array<MeanLight, 5> analyses_of(const Arrangement& arrangement, double wavelength);
 
 /// A unitary matrix as a rotation, then a linear retarder.
 struct EquivalentRetarder {

@@ -1,7 +1,6 @@
 #include "integrators/polariscope/load_polariscope.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -17,13 +16,6 @@ constexpr double auto_orders = 4;   // That 99 of 100 rays do not exceed.
 constexpr int probe_pixels = 64;    // Along the longer side of the silhouette.
 constexpr double nanometre = 1e-9;  // m.
 
-/// The bands of the scene. Light of one wavelength has no width.
-std::vector<Band> bands_of(const Scene& scene) {
-  std::vector<Band> bands = scene.bands;
-  if (scene.description.light.wavelength_min == scene.description.light.wavelength_max) bands.front().width = 0;
-  return bands;
-}
-
 /// The coefficients of a file, which must cover the light. @throw std::runtime_error.
 Spectrum read_coefficients(const std::filesystem::path& file, const LightDescription& light, double reference) {
   Spectrum table = read_spectrum(file, true);
@@ -38,43 +30,24 @@ Spectrum read_coefficients(const std::filesystem::path& file, const LightDescrip
   return table;
 }
 
-/// The volume's silhouette behind the volume, as a plate of few pixels.
-Plate silhouette(const Scene& scene, const PolarizedLight& light) {
-  const Beam beam = silhouette_beam(scene.field.corners(), light.direction, light.up);
-  Eigen::AlignedBox2d box;
-  for (const Eigen::Vector2d& corner : beam.aperture) box.extend(corner);
-  Plate plate;
-  plate.up = beam.up;
-  plate.right = beam.right;
-  plate.center = beam.start(box.center()) + depth_range(scene.field, beam.center, beam.direction).far * beam.direction;
-  plate.size = box.sizes();
-  plate.resolution = (probe_pixels * plate.size / plate.size.maxCoeff()).array().ceil().max(1).cast<int>().matrix();
-  return plate;
-}
-
 /// The integral of the secondary principal difference that 99 of 100 rays through the field do not exceed.
 double greatest_integral(const Scene& scene, PolarizedLight light) {
   const Geometry volume({scene.geometry.surfaces().bounds, scene.geometry.surfaces().cut, std::nullopt, {}});
+  const Beam beam = silhouette_beam(scene.field.corners(), light.direction, light.up);
+  const auto [near, far] = depth_range(scene.field, beam.center, beam.direction);
   light.bands.clear();
   light.aperture.reset();
-  light.strength = 1;
+  light.strength = 1 / (scene.field.max_norm() * (far - near));  // Any units: phases are about 1.
   light.samples = 1;
-  const Plate plate = silhouette(scene, light);
+  const Plate plate = plate_across(beam, far, probe_pixels);
   const PolarTracer tracer(scene.field, volume, light, plate);
   std::vector<LightRow> rows(static_cast<std::size_t>(plate.resolution.y()));
   tbb::parallel_for(std::size_t(0), rows.size(), [&](std::size_t y) { rows[y] = tracer.row(static_cast<int>(y)); });
   std::vector<float> integrals;
   for (const LightRow& row : rows)
     for (const PolarPoint& point : row.points)
-      if (point.length > 0) integrals.push_back(point.integral / 2);
-  return greatest_of_most(integrals);
-}
-
-/// A number as it is printed, so that a scene can have the same.
-double rounded(double value) {
-  const std::string text = fmt::format("{:.6g}", value);
-  std::from_chars(text.data(), text.data() + text.size(), value);  // In any locale.
-  return value;
+      if (point.length > 0) integrals.push_back(static_cast<float>(point.integral / 2));
+  return greatest_of_most(integrals) / light.strength;
 }
 
 double choose_coefficient(const Scene& scene, const PolarizedLight& light, double unit_length, double wavelength,
@@ -83,7 +56,7 @@ double choose_coefficient(const Scene& scene, const PolarizedLight& light, doubl
   const std::string key =
       fmt::format("stress_optic {} {} {} {} {}", V.x(), V.y(), V.z(), unit_length, scene.geometry.has_cut());
   std::shared_ptr<const double> known = scene.kept ? scene.kept->find<double>(key) : nullptr;
-  const double integral = known ? *known : greatest_integral(scene, light);
+  const double integral = known ? *known : scene.field.max_norm() > 0 ? greatest_integral(scene, light) : 0;
   if (scene.kept && !known) scene.kept->keep(key, integral, sizeof integral);
   if (!(integral > 0)) {
     notes.push_back(
@@ -91,7 +64,9 @@ double choose_coefficient(const Scene& scene, const PolarizedLight& light, doubl
         "the volume); stress_optic 1");
     return 1;
   }
-  const double chosen = rounded(auto_orders * wavelength * nanometre / (unit_length * integral));
+  // As it is printed, so that a scene can have the same.
+  const double chosen =
+      Json::parse(fmt::format("{:.6g}", auto_orders * wavelength * nanometre / (unit_length * integral)));
   notes.push_back(
       fmt::format("stress_optic: {:g} (99 of 100 rays through the field have {:g} orders or fewer at {:g} "
                   "nm); give that of the material to compare with a photograph",
@@ -101,10 +76,10 @@ double choose_coefficient(const Scene& scene, const PolarizedLight& light, doubl
 
 }  // namespace
 
-std::vector<Eigen::Vector3d> band_colors(const Scene& scene) {
-  std::vector<Eigen::Vector3d> colors;
-  for (const Band& band : scene.bands) colors.emplace_back(to_working(scene) * band.xyz);
-  return colors;
+Eigen::Matrix3Xd band_colors(const Scene& scene) {
+  Eigen::Matrix3Xd xyz(3, scene.bands.size());
+  for (std::size_t k = 0; k < scene.bands.size(); ++k) xyz.col(static_cast<Eigen::Index>(k)) = scene.bands[k].xyz;
+  return to_working(scene) * xyz;
 }
 
 double greatest_of_most(std::vector<float>& values) {
@@ -123,7 +98,8 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
   light.up = upright(light.direction, plate.up);
   light.right = light.direction.cross(light.up);
   light.start = scene.beam.center;
-  light.bands = bands_of(scene);
+  light.bands = scene.bands;
+  if (scene.description.light.wavelength_min == scene.description.light.wavelength_max) light.bands.front().width = 0;
   light.reference = reference_channel(scene);
   light.samples = settings.samples.value_or(2);
   const double wavelength = loaded.wavelength = light.bands[light.reference].wavelength;
@@ -146,10 +122,10 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
   } else {
     loaded.stress_optic = choose_coefficient(scene, light, settings.unit_length, wavelength, notes);
   }
-  if (!std::isfinite(static_cast<float>(loaded.stress_optic * settings.unit_length * scene.field.max_norm())))
-    throw std::runtime_error("`/integrator/stress_optic` times the field is beyond single precision; check its units");
   light.strength = pi * loaded.stress_optic * settings.unit_length / (wavelength * nanometre);
-  loaded.arrangement = turned(arrangement_of(settings.arrangement), settings.angle, settings.analyzer);
+  if (!std::isfinite(static_cast<float>(light.strength * scene.field.max_norm())))
+    throw std::runtime_error("`/integrator/stress_optic` times the field is beyond single precision; check its units");
+  loaded.arrangement = turned(settings.arrangement, settings.angle, settings.analyzer);
   return loaded;
 }
 

@@ -26,7 +26,7 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
                                           std::vector<std::string>& notes);
 
 /// R, G and B of the light's bands, in the working space.
-std::vector<Eigen::Vector3d> band_colors(const Scene& scene);
+Eigen::Matrix3Xd band_colors(const Scene& scene);
 
 /// What 99 of 100 of the values do not exceed; 0 if there are none. Changes their order.
 double greatest_of_most(std::vector<float>& values);
@@ -36,7 +36,6 @@ double greatest_of_most(std::vector<float>& values);
 /// analyser. For Render::draw_legend. @param greatest  Finite, > 0.
 std::function<void(Image&, double exposure)> polariscope_legend(const Scene& scene,
                                                                 const LoadedLightOfPolariscope& loaded,
-                                                                const PolariscopeDescription& settings,
                                                                 double greatest);
 
 }  // namespace tensorray

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <memory>
 
 #include <tbb/enumerable_thread_specific.h>
 
@@ -16,8 +18,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int most_threes = 5;        // A band has 3⁵ wavelengths at most.
-constexpr int most_sections = 10000;  // Of a ray in the body: a limit that no body reaches.
+constexpr std::size_t most_wavelengths = 243;  // Of a band: a power of three, so that coarser divisions are part of it.
+constexpr int most_sections = 10000;           // Of a ray in the body: a limit that no body reaches.
 
 /// Middle of a step along its ray, from the plate, and its length.
 struct RayStep {
@@ -60,10 +62,6 @@ struct PolarTracer::Packet {
   std::vector<Sum> sums;
 };
 
-struct PolarTracer::Samplers : tbb::enumerable_thread_specific<DifferenceSampler> {
-  using enumerable_thread_specific::enumerable_thread_specific;
-};
-
 PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, const PolarizedLight& light,
                          const Plate& plate)
     : field_(field),
@@ -73,25 +71,24 @@ PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, con
       across_(field.to_index().linear() * light.direction),
       steps_per_length_(std::ldexp(across_.norm(), field.levels() - 1)),
       room_(turning_room(light.bands.size())),
-      samplers_(std::make_unique<Samplers>(
-          [this] { return DifferenceSampler(field_, across_, light_.right, light_.up, light_.strength); })) {
-  for (const Band& band : light.bands)
-    widest_ = std::max(widest_, std::abs(light.relative(band.wavelength + band.width / 2) -
-                                         light.relative(band.wavelength - band.width / 2)));
-  for (int threes = 0, count = 1; threes <= most_threes; ++threes, count *= 3) {
-    auto& level = strengths_.emplace_back();
-    for (int i = 0; i < count; ++i) {
-      std::vector<float>& strengths = level.emplace_back(room_, 0.0f);
-      for (std::size_t k = 0; k < light.bands.size(); ++k) {
-        const Band& band = light.bands[k];
-        strengths[k] = static_cast<float>(light.relative(band.wavelength + band.width * ((i + 0.5) / count - 0.5)));
-        greatest_ = std::max(greatest_, std::abs(static_cast<double>(strengths[k])));
-      }
-    }
+      greatest_(light.bands.empty() ? 1 : 0),
+      strengths_(most_wavelengths, std::vector<float>(room_)) {
+  const auto relative = [&](const Band& band, double place) {  // From 0 to 1 within the band.
+    return light.relative(band.wavelength + band.width * (place - 0.5));
+  };
+  const auto place = [](std::size_t i) { return (static_cast<double>(i) + 0.5) / most_wavelengths; };
+  for (const Band& band : light.bands) {
+    widest_ = std::max(widest_, std::abs(relative(band, 1) - relative(band, 0)));
+    for (std::size_t i = 0; i < most_wavelengths; ++i)
+      greatest_ = std::max(greatest_, std::abs(relative(band, place(i))));
   }
+  for (std::size_t i = 0; i < most_wavelengths; ++i)
+    for (std::size_t k = 0; k < light.bands.size(); ++k)
+      strengths_[i][k] = static_cast<float>(relative(light.bands[k], place(i)) / greatest_);
+  const auto samplers = std::make_shared<tbb::enumerable_thread_specific<DifferenceSampler>>(
+      [this] { return DifferenceSampler(field_, across_, light_.right, light_.up, light_.strength * greatest_); });
+  sampler_ = [samplers]() -> DifferenceSampler& { return samplers->local(); };
 }
-
-PolarTracer::~PolarTracer() = default;
 
 void PolarTracer::find_steps(Ray& ray) const {
   const Vector3d& k = light_.direction;
@@ -127,7 +124,7 @@ void PolarTracer::find_steps(Ray& ray) const {
 
 /// Finds the turns and phases of all rays, step by step.
 void PolarTracer::sample(Packet& packet) const {
-  DifferenceSampler& sampler = samplers_->local();
+  DifferenceSampler& sampler = sampler_();
   RaySteps& steps = packet.steps;
   std::size_t most = 0;
   for (std::size_t i = 0; i < ray_lanes; ++i) {
@@ -144,13 +141,8 @@ void PolarTracer::sample(Packet& packet) const {
       steps.length[i] = static_cast<float>(at.length);
     }
     sampler.sample(steps);
-    if (room_ > 0) add_steps(steps, greatest_, packet.turns);
-    const auto difference = [&](int point, std::size_t i) {
-      const double a = steps.a[point][i], b = steps.b[point][i];  // Squares may be beyond single precision.
-      return std::sqrt(a * a + b * b);
-    };
-    for (std::size_t i = 0; i < ray_lanes; ++i)
-      packet.rays[i].phase += steps.length[i] * (difference(0, i) + difference(1, i)) / 2;
+    packet.turns.push_back(turns_of(steps));
+    for (std::size_t i = 0; i < ray_lanes; ++i) packet.rays[i].phase += packet.turns.back().phase[i] / greatest_;
   }
 }
 
@@ -158,26 +150,24 @@ void PolarTracer::sample(Packet& packet) const {
 void PolarTracer::add(std::size_t lane, float weight, std::size_t x, Packet& packet, LightRow& row) const {
   const Ray& ray = packet.rays[lane];
   if (!ray.is_lit) return;
-  row.lit[x] += weight;
-  float* const rotations = room_ > 0 ? &row.rotations[9 * room_ * x] : nullptr;
+  float* const light = row.bands.data() + 10 * room_ * x;
   if (ray.steps.empty()) {
-    for (const std::size_t i : {0, 4, 8})
-      for (std::size_t k = 0; k < room_; ++k) rotations[i * room_ + k] += weight;
+    for (const std::size_t i : {0, 4, 8, 9})
+      for (std::size_t k = 0; k < room_; ++k) light[i * room_ + k] += weight;
     return;
   }
   PolarPoint& point = row.points[x];
-  point.integral += static_cast<float>(2 * ray.phase);
-  point.length += static_cast<float>(ray.length);
+  point.integral += 2 * ray.phase;
+  point.length += ray.length;
   ++packet.sums[x].inside;
   if (room_ == 0) return;
   packet.planes.resize(4 * room_);
-  std::size_t threes = 0;
-  for (double change = 2 * ray.phase * widest_; change > 1 && threes < most_threes; change /= 3) ++threes;
-  const std::vector<std::vector<float>>& wavelengths = strengths_[threes];
-  for (std::size_t i = 0; i < wavelengths.size(); ++i) {
-    turn(packet.turns, lane, wavelengths[i].data(), room_, packet.planes.data());
-    add_rotations(packet.planes.data(), weight / static_cast<float>(wavelengths.size()), room_, rotations);
-    if (i == wavelengths.size() / 2)  // The middle of the band.
+  std::size_t stride = most_wavelengths;
+  for (double change = 2 * ray.phase * widest_; change > 1 && stride > 1; change /= 3) stride /= 3;
+  const float part = weight * static_cast<float>(stride) / most_wavelengths;
+  for (std::size_t i = stride / 2; i < most_wavelengths; i += stride) {
+    turn(packet.turns, lane, strengths_[i].data(), room_, part, packet.planes.data(), light);
+    if (i == most_wavelengths / 2)  // The middle of the band.
       for (std::size_t c = 0; c < 4; ++c)
         packet.sums[x].mean[static_cast<int>(c)] += packet.planes[c * room_ + light_.reference];
   }
@@ -187,8 +177,7 @@ LightRow PolarTracer::row(int y) const {
   const auto width = static_cast<std::size_t>(plate_.resolution.x()), n = static_cast<std::size_t>(light_.samples);
   LightRow row;
   row.room = room_;
-  row.rotations.resize(9 * room_ * width);
-  row.lit.resize(width);
+  row.bands.resize(10 * room_ * width);
   row.points.resize(width);
   Packet packet;
   packet.sums.resize(width);
@@ -209,68 +198,51 @@ LightRow PolarTracer::row(int y) const {
       add(i, 1 / static_cast<float>(n * n), (begin + i) / (n * n), packet, row);
   }
   for (std::size_t x = 0; x < width; ++x) {
-    const auto inside = static_cast<float>(packet.sums[x].inside);
+    const int inside = packet.sums[x].inside;
     if (inside == 0) continue;
-    PolarPoint& point = row.points[x];
-    point.integral /= inside;
-    point.length /= inside;
+    row.points[x].integral /= inside;
+    row.points[x].length /= inside;
     // The mean of unitary matrices is that of the middle, as they are smooth.
     const Eigen::Vector4d mean = packet.sums[x].mean.normalized();
-    const EquivalentRetarder retarder = equivalent_retarder({mean[0], mean[1], mean[2], mean[3]});
-    point.phase = static_cast<float>(retarder.phase);
-    point.azimuth = static_cast<float>(retarder.azimuth);
-    point.rotation = static_cast<float>(retarder.rotation);
+    row.points[x].retarder = equivalent_retarder({mean[0], mean[1], mean[2], mean[3]});
   }
   return row;
 }
 
-void PolarView::Analyses::set(std::size_t band, const Analysis& analysis) {
-  const auto row = static_cast<Eigen::Index>(band);
-  through[row] = static_cast<float>(analysis.through);
-  for (int i = 0; i < 9; ++i) by_rotation(row, i) = static_cast<float>(analysis.by_rotation(i / 3, i % 3));
-}
-
-Eigen::VectorXf PolarView::Analyses::powers(const LightRow& row, std::size_t x) const {
-  return row.lit[x] * through + by_rotation.cwiseProduct(rotations_of(row, x)).rowwise().sum();
-}
-
-PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands,
-                     const std::vector<Vector3d>& colors, bool stokes)
-    : bands_(static_cast<Eigen::Index>(bands.size())) {
+PolarView::PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, const Eigen::Matrix3Xd& colors,
+                     bool stokes)
+    : bands_(colors.cols()) {
   const auto room = static_cast<Eigen::Index>(turning_room(bands.size()));
-  shown_ = {Eigen::VectorXf::Zero(room), BandRotations::Zero(room, 9)};
-  spectra_.assign(stokes ? 4 : 0, shown_);
-  colors_ = Eigen::Matrix3Xf::Zero(3, room);
-  for (std::size_t k = 0; k < bands.size(); ++k) {
-    shown_.set(k, analysis_of(arrangement, bands[k].wavelength));
-    for (std::size_t s = 0; s < spectra_.size(); ++s)
-      spectra_[s].set(k, stokes_of(arrangement, bands[k].wavelength)[s]);
-    const auto column = static_cast<Eigen::Index>(k);
-    colors_.col(column) = colors[k].cast<float>();
-    achromatic_ &=
-        shown_.through[column] == shown_.through[0] && shown_.by_rotation.row(column) == shown_.by_rotation.row(0);
+  analyses_.assign(stokes ? 5 : 1, BandLight::Zero(room, 10));
+  for (Eigen::Index k = 0; k < bands_; ++k) {
+    const std::array<MeanLight, 5> analyses = analyses_of(arrangement, bands[static_cast<std::size_t>(k)].wavelength);
+    for (std::size_t i = 0; i < analyses_.size(); ++i) analyses_[i].row(k) = analyses[i].cast<float>().transpose();
   }
-  if (!stokes) spectra_.push_back(shown_);
-  through_ = colors_ * shown_.through;
+  colors_ = Eigen::Matrix3Xf::Zero(3, room);
+  colors_.leftCols(bands_) = colors.cast<float>();
+  const BandLight& shown = analyses_.front();
+  achromatic_ = shown.topRows(bands_) == shown.row(0).replicate(bands_, 1);
 }
 
 void PolarView::set_sums(LightRow& row) const {
-  row.sums.resize(27 * row.lit.size());
-  for (std::size_t x = 0; x < row.lit.size(); ++x)
-    Eigen::Map<Eigen::Matrix<float, 3, 9>>(&row.sums[27 * x]).noalias() = colors_ * rotations_of(row, x);
+  row.sums.resize(30 * row.points.size());
+  for (std::size_t x = 0; x < row.points.size(); ++x)
+    Eigen::Map<Eigen::Matrix<float, 3, 10>>(&row.sums[30 * x]).noalias() = colors_ * bands_of(row, x);
 }
 
 Eigen::Vector3f PolarView::color(const LightRow& row, std::size_t x) const {
-  if (!achromatic_) return colors_ * shown_.powers(row, x);
-  const Eigen::Map<const Eigen::Matrix<float, 3, 9>> sums(&row.sums[27 * x]);
-  return row.lit[x] * through_ + sums * shown_.by_rotation.row(0).transpose();
+  const BandLight& shown = analyses_.front();
+  if (!achromatic_) return colors_ * shown.cwiseProduct(bands_of(row, x)).rowwise().sum();
+  return Eigen::Map<const Eigen::Matrix<float, 3, 10>>(&row.sums[30 * x]) * shown.row(0).transpose();
 }
 
-void PolarView::spectrum(const LightRow& row, std::size_t x, float* spectrum) const {
-  for (const Analyses& parameter : spectra_) {
-    Eigen::Map<Eigen::VectorXf>(spectrum, bands_) = parameter.powers(row, x).head(bands_);
-    spectrum += bands_;
-  }
+Eigen::MatrixXf PolarView::spectrum(const LightRow& row, std::size_t x) const {
+  const std::size_t first = analyses_.size() > 1 ? 1 : 0;
+  Eigen::MatrixXf result(bands_, analyses_.size() - first);
+  for (std::size_t i = first; i < analyses_.size(); ++i)
+    result.col(static_cast<Eigen::Index>(i - first)) =
+        analyses_[i].cwiseProduct(bands_of(row, x)).rowwise().sum().head(bands_);
+  return result;
 }
 
 }  // namespace tensorray

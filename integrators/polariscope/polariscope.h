@@ -5,7 +5,6 @@
 ///   a = u·T u − w·T w,   b = u·(T + Tᵀ) w,   dE/dz = −i (π C/λ) [[a, b], [b, −a]] E.
 
 #include <functional>
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -18,6 +17,8 @@
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
+
+class DifferenceSampler;
 
 /// The light that is traced.
 struct PolarizedLight {
@@ -41,24 +42,22 @@ struct PolarizedLight {
 
 /// What is known of the light of a pixel, the mean of its samples. The phases are those of the reference wavelength.
 struct PolarPoint {
-  float phase = 0, azimuth = 0, rotation = 0;  ///< EquivalentRetarder.
-  float integral = 0;  ///< 2π C/λ ∫(σ₁' − σ₂') dz, mean of the samples in the field.
-  float length = 0;    ///< The way in the field, world units; likewise.
+  EquivalentRetarder retarder;
+  double integral = 0;  ///< 2π C/λ ∫(σ₁' − σ₂') dz, mean of the samples in the field.
+  double length = 0;    ///< The way in the field, world units; likewise.
 };
 
 /// The light of a row of pixels, for any arrangement.
 struct LightRow {
-  std::size_t room = 0;          ///< Bands that a pixel has room for.
-  std::vector<float> rotations;  ///< Of a pixel, nine planes of `room` each: the mean rotation (elements.h) by bands.
-  std::vector<float> lit;        ///< By pixels: the part of the light that nothing stops.
+  std::size_t room = 0;      ///< Bands that a pixel has room for.
+  std::vector<float> bands;  ///< Of a pixel, ten planes of `room` each: MeanLight by bands.
+  std::vector<float> sums;   ///< Of a pixel, of each of the ten planes, the sums of red, green and blue (PolarView).
   std::vector<PolarPoint> points;
-  std::vector<float> sums;  ///< By pixels: of the nine planes, the sums of three colours each (PolarView).
 };
 
-/// A number of bands, and for each of them the nine components of a rotation, row by row.
-using BandRotations = Eigen::Matrix<float, Eigen::Dynamic, 9>;
-inline Eigen::Map<const BandRotations> rotations_of(const LightRow& row, std::size_t x) {
-  return {&row.rotations[9 * row.room * x], static_cast<Eigen::Index>(row.room), 9};
+using BandLight = Eigen::Matrix<float, Eigen::Dynamic, 10>;
+inline Eigen::Map<const BandLight> bands_of(const LightRow& row, std::size_t x) {
+  return {&row.bands[10 * row.room * x], static_cast<Eigen::Index>(row.room), 10};
 }
 
 /// Traces parallel light to the pixels of a plate. Steps are at most the finest voxel long, of fourth order in the
@@ -68,7 +67,6 @@ class PolarTracer {
  public:
   /// All must outlive it. @param geometry  Bounds, cut and obstacles.
   PolarTracer(const TensorField& field, const Geometry& geometry, const PolarizedLight& light, const Plate& plate);
-  ~PolarTracer();
 
   /// Any thread may call it. The result depends on the row alone.
   LightRow row(int y) const;
@@ -78,7 +76,6 @@ class PolarTracer {
  private:
   struct Ray;
   struct Packet;
-  struct Samplers;
   void find_steps(Ray& ray) const;
   void sample(Packet& packet) const;
   void add(std::size_t lane, float weight, std::size_t x, Packet& packet, LightRow& row) const;
@@ -90,17 +87,17 @@ class PolarTracer {
   Eigen::Vector3d across_;   // k in index space.
   double steps_per_length_;  // At least.
   std::size_t room_;
-  std::unique_ptr<Samplers> samplers_;                      // Of threads: bricks that are converted.
-  double widest_ = 0;                                       // Change of the relative strength within a band, at most.
-  double greatest_ = 0;                                     // Relative strength.
-  std::vector<std::vector<std::vector<float>>> strengths_;  // By power of three; by wavelength of a band; by band.
+  double greatest_ = 0;                          // Of PolarizedLight::relative.
+  double widest_ = 0;                            // Its change within a band, at most.
+  std::vector<std::vector<float>> strengths_;    // By wavelength of a band, by band: as a part of the greatest.
+  std::function<DifferenceSampler&()> sampler_;  // Of the thread: it keeps bricks.
 };
 
 /// What an arrangement shows of many pixels.
 class PolarView {
  public:
   /// @param colors  R, G and B of each band. @param stokes  Whether spectra are Stokes' parameters.
-  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, const std::vector<Eigen::Vector3d>& colors,
+  PolarView(const Arrangement& arrangement, const std::vector<Band>& bands, const Eigen::Matrix3Xd& colors,
             bool stokes);
 
   /// Whether the arrangement treats all bands alike, so that `sums` are enough for its colours.
@@ -108,23 +105,14 @@ class PolarView {
   void set_sums(LightRow& row) const;
   Eigen::Vector3f color(const LightRow& row, std::size_t x) const;
 
-  /// The power of each band (Analysis::power); or S0 of all bands, then S1, S2 and S3.
-  void spectrum(const LightRow& row, std::size_t x, float* spectrum) const;
+  /// The power of each band; or a column of each of S0, S1, S2 and S3.
+  Eigen::MatrixXf spectrum(const LightRow& row, std::size_t x) const;
 
  private:
-  /// By bands.
-  struct Analyses {
-    Eigen::VectorXf through;
-    BandRotations by_rotation;
-    void set(std::size_t band, const Analysis& analysis);
-    Eigen::VectorXf powers(const LightRow& row, std::size_t x) const;
-  };
   Eigen::Index bands_;
-  bool achromatic_ = true;
-  std::vector<Analyses> spectra_;  // Of each parameter.
-  Analyses shown_;
+  std::vector<BandLight> analyses_;  // Of the power that is shown, then of Stokes' parameters if they are wanted.
   Eigen::Matrix3Xf colors_;
-  Eigen::Vector3f through_;  // Colour of what passes, whatever R is.
+  bool achromatic_;
 };
 
 }  // namespace tensorray

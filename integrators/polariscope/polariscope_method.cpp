@@ -35,21 +35,23 @@ ChannelTable<PolarPixel> polariscope_channels() {
   using Pixel = const PolarPixel&;
   return {{{"R", "G", "B"}, [](Pixel pixel) { return pixel.color; }},
           {{"A"}, [](Pixel) { return 1; }},
-          {{"retardance"}, [](Pixel pixel) { return pixel.nanometres * pixel.point.phase; }},
+          {{"retardance"}, [](Pixel pixel) { return pixel.nanometres * pixel.point.retarder.phase; }},
           {{"integral"}, [](Pixel pixel) { return pixel.nanometres * pixel.point.integral; }},
-          {{"azimuth"}, [](Pixel pixel) { return pixel.point.azimuth; }},
-          {{"rotation"}, [](Pixel pixel) { return pixel.point.rotation; }},
+          {{"azimuth"}, [](Pixel pixel) { return pixel.point.retarder.azimuth; }},
+          {{"rotation"}, [](Pixel pixel) { return pixel.point.retarder.rotation; }},
           {{"length"}, [](Pixel pixel) { return pixel.point.length; }}};
 }
 
-constexpr std::size_t retardance_channel = 4, integral_channel = 5, azimuth_channel = 6, length_channel = 8;
+constexpr std::size_t integral_channel = 5, azimuth_channel = 6, length_channel = 8;
+
+int spectral_channels(const SceneDescription& scene) {
+  return scene.output.wants("spectral") ? channel_count(scene) * (scene.output.stokes ? 4 : 1) : 0;
+}
 
 /// The rows of a picture, as far as they are made.
 struct PolarPicture {
   Image image;
-  std::size_t spectra = 0;  ///< Numbers of a pixel in `spectrum`.
-  std::vector<float>
-      spectrum;  ///< By pixels: each band's power, or S0 of all bands, then S1, S2, S3; empty: not wanted.
+  Film spectra;  ///< Powers of the bands, or S0 of all bands, then S1, S2 and S3; without channels if it is not wanted.
 };
 
 /// Turns traced light into the pixels of a row. @param nanometres  Of a phase of 1.
@@ -58,32 +60,26 @@ void draw_row(const PolarView& view, double nanometres, const LightRow& row, std
   for (std::size_t x = 0; x < row.points.size(); ++x) {
     write_channels(table, {view.color(row, x), row.points[x], nanometres},
                    picture.image.pixel(static_cast<int>(x), static_cast<int>(y)));
-    if (picture.spectra > 0) view.spectrum(row, x, &picture.spectrum[(y * row.points.size() + x) * picture.spectra]);
+    if (picture.spectra.channels == 0) continue;
+    const Eigen::MatrixXf spectrum = view.spectrum(row, x);
+    for (int c = 0; c < picture.spectra.channels; ++c)
+      picture.spectra.plane(c)[y * row.points.size() + x] = spectrum(c);
   }
 }
 
-/// Radiance by bands; with Stokes' parameters S1, S2 and S3 before S0. Its colours are the picture's.
+/// Radiance by bands. Its colours are the picture's.
 SpectralImage spectral_picture(const PolarPicture& picture, const Scene& scene) {
-  const std::size_t count = scene.bands.size();
-  const std::vector<std::size_t> parameters =
-      picture.spectra > count ? std::vector<std::size_t>{1, 2, 3, 0} : std::vector<std::size_t>{0};
-  Film film(picture.image.width, picture.image.height, static_cast<int>(picture.spectra));
   std::vector<Band> bands;
-  for (const std::size_t s : parameters)
-    for (std::size_t k = 0; k < count; ++k) {
-      double* const plane = film.plane(static_cast<int>(bands.size()));
-      for (std::size_t i = 0; i < film.plane_size(); ++i)
-        plane[i] = picture.spectrum[i * picture.spectra + s * count + k];
-      bands.push_back(scene.bands[k]);
-    }
-  SpectralImage result = spectral_image(film, bands, SpectralQuantity::radiance,
+  while (bands.size() < static_cast<std::size_t>(picture.spectra.channels))
+    bands.insert(bands.end(), scene.bands.begin(), scene.bands.end());
+  SpectralImage result = spectral_image(picture.spectra, bands, SpectralQuantity::radiance,
                                         scene.description.light.irradiance / pi, to_working(scene));
   for (std::size_t c = 0; c < bands.size(); ++c)
-    result.image.channels[3 + c][1] = static_cast<char>('0' + parameters[c / count]);
-  for (int y = 0; y < film.height; ++y)
-    for (int x = 0; x < film.width; ++x) std::copy_n(picture.image.pixel(x, y), 3, result.image.pixel(x, y));
+    result.image.channels[3 + c][1] = static_cast<char>('0' + c / scene.bands.size());  // S0 to S3.
+  for (int y = 0; y < picture.image.height; ++y)
+    for (int x = 0; x < picture.image.width; ++x) std::copy_n(picture.image.pixel(x, y), 3, result.image.pixel(x, y));
   result.bands = scene.bands;
-  if (parameters.size() > 1) result.metadata["polarisationHandedness"] = "right";
+  if (scene.description.output.stokes) result.metadata["polarisationHandedness"] = "right";
   return result;
 }
 
@@ -111,7 +107,7 @@ class LoadedPolariscope : public LoadedMethod {
   using Rows = std::vector<LightRow>;
 
   std::string traced_key(const Scene& scene) const;
-  Render render_of(const Scene& scene, const PolarPicture& picture) const;
+  Render render_of(const Scene& scene, Image picture) const;
 
   PolariscopeDescription settings_;
   LoadedLightOfPolariscope loaded_;
@@ -122,15 +118,15 @@ std::string LoadedPolariscope::traced_key(const Scene& scene) const {
   Json json = Json::parse(scene.description.text);
   for (const char* key : {"output", "camera", "lights", "objects", "seed"}) json.erase(key);
   for (const char* key : {"arrangement", "angle", "analyzer", "type"}) json["integrator"].erase(key);
-  std::string files;
+  std::string key = json.dump();
   for (const NamedFile& input : input_files(scene.description)) {
     std::error_code none;
-    files += fmt::format(" {}", std::filesystem::last_write_time(input.path, none).time_since_epoch().count());
+    key += fmt::format(" {}", std::filesystem::last_write_time(input.path, none).time_since_epoch().count());
   }
-  for (const Eigen::Vector3d& color : band_colors(scene))
-    files += fmt::format(" {} {} {}", color[0], color[1], color[2]);
+  const Eigen::Matrix3Xd colors = band_colors(scene);
+  for (const double value : colors.reshaped()) key += fmt::format(" {}", value);
   const Eigen::Vector3d& V = loaded_.light.direction;
-  return json.dump() + files + fmt::format(" {} {} {} {}", V.x(), V.y(), V.z(), loaded_.stress_optic);
+  return key + fmt::format(" {} {} {} {}", V.x(), V.y(), V.z(), loaded_.stress_optic);
 }
 
 /// The slow axis, of an order that is not wrapped. @param azimuth  Of the wrapped retardance, of which the other axis
@@ -141,14 +137,14 @@ double slow_axis(double order, double azimuth) {
 }
 
 /// What is shown of the picture, which may not be complete.
-Render LoadedPolariscope::render_of(const Scene& scene, const PolarPicture& picture) const {
+Render LoadedPolariscope::render_of(const Scene& scene, Image picture) const {
+  std::vector<float> integrals = integrals_of(picture);
   Render result;
-  result.linear = picture.image;
+  result.linear = std::move(picture);
   result.exposure = 0;
   const Plate& plate = *scene.geometry.surfaces().plate;
   result.view = picture_view(plate);
   result.outline = body_outline(scene, plate);
-  std::vector<float> integrals = integrals_of(picture.image);
   const double greatest = integrals.empty() ? 0 : *std::max_element(integrals.begin(), integrals.end());
   const double order = greatest / loaded_.wavelength;
   result.notes.push_back(
@@ -164,7 +160,7 @@ Render LoadedPolariscope::render_of(const Scene& scene, const PolarPicture& pict
                      {"tensorray:wavelength", fmt::format("{:.17g}", loaded_.wavelength)}};
   if (scene.description.output.wants(Annotation::legend)) {
     const double shown = greatest_of_most(integrals);
-    result.draw_legend = polariscope_legend(scene, loaded_, settings_, shown > 0 ? shown : loaded_.wavelength);
+    result.draw_legend = polariscope_legend(scene, loaded_, shown > 0 ? shown : loaded_.wavelength);
   }
   result.describe_pixel = [wavelength = loaded_.wavelength](const float* pixel) {
     return std::vector<std::pair<std::string, std::string>>{
@@ -183,16 +179,16 @@ Render LoadedPolariscope::render(const Scene& scene, const Progress& progress, R
   const double nanometres = loaded_.wavelength / (2 * pi);
   const auto width = static_cast<std::size_t>(plate.resolution.x()),
              height = static_cast<std::size_t>(plate.resolution.y());
-  PolarPicture picture;
-  picture.image = Image(plate.resolution.x(), plate.resolution.y(), channel_names(polariscope_channels()));
-  if (scene.description.output.wants("spectral"))
-    picture.spectra = scene.bands.size() * (scene.description.output.stokes ? 4 : 1);
-  picture.spectrum.resize(width * height * picture.spectra);
+  PolarPicture picture{{plate.resolution.x(), plate.resolution.y(), channel_names(polariscope_channels())}, {}};
+  picture.spectra = {plate.resolution.x(), plate.resolution.y(), spectral_channels(scene.description)};
 
   const std::string key = traced_key(scene);
   const std::shared_ptr<const Rows> known = scene.kept ? scene.kept->find<Rows>(key) : nullptr;
-  const std::size_t bytes = width * height * (9 * tracer.room() + 33) * sizeof(float);
-  const bool keeps = scene.kept && !known && bytes <= KeptResults::max_bytes;
+  // Sums are enough for the colours of most arrangements. Bands are kept only where there is room for them.
+  const bool needs_bands = !view.is_achromatic() || picture.spectra.channels > 0;
+  const std::size_t pixel_bytes = sizeof(PolarPoint) + 30 * sizeof(float);
+  const std::size_t bytes_with_bands = width * height * (pixel_bytes + 10 * tracer.room() * sizeof(float));
+  const bool keeps = scene.kept && !known, keeps_bands = bytes_with_bands <= KeptResults::max_bytes;
   Rows traced(keeps ? height : 0);
 
   Units rows;
@@ -200,27 +196,31 @@ Render LoadedPolariscope::render(const Scene& scene, const Progress& progress, R
   rows.kind = "polarised row";
   rows.round = rows_per_round;
   rows.make = [&](std::size_t y) {
-    if (known) return draw_row(view, nanometres, (*known)[y], y, picture);
+    const bool is_enough = known && !(needs_bands && (*known)[y].bands.empty());
+    if (is_enough) return draw_row(view, nanometres, (*known)[y], y, picture);
     LightRow row = tracer.row(static_cast<int>(y));
-    if (keeps || view.is_achromatic()) view.set_sums(row);
+    view.set_sums(row);
     draw_row(view, nanometres, row, y, picture);
+    if (!keeps_bands) row.bands = std::vector<float>();
     if (keeps) traced[y] = std::move(row);
   };
   rows.copy = [&](std::size_t y, Archive& archive) {
-    const std::size_t pixels = width * picture.image.channels.size(), numbers = width * picture.spectra;
-    archive.copy(&picture.image.pixels[y * pixels], pixels * sizeof(float));
-    if (numbers > 0) archive.copy(&picture.spectrum[y * numbers], numbers * sizeof(float));
+    archive.copy(picture.image.pixel(0, static_cast<int>(y)), width * picture.image.channels.size() * sizeof(float));
+    for (int c = 0; c < picture.spectra.channels; ++c)
+      archive.copy(picture.spectra.plane(c) + y * width, width * sizeof(double));
   };
   if (job)
     rows.shown = [&] {
-      if (job->takes_picture_request()) job->show(render_of(scene, picture));
+      if (job->takes_picture_request()) job->show(render_of(scene, picture.image));
     };
   make_units(rows, job, "tracing rays", progress);
-  if (keeps) scene.kept->keep(key, std::move(traced), bytes);
+  if (keeps) scene.kept->keep(key, std::move(traced), keeps_bands ? bytes_with_bands : width * height * pixel_bytes);
   if (job && (job->is_shard || !is_root(job->ranks))) return {};
 
-  Render result = render_of(scene, picture);
-  if (picture.spectra > 0) result.spectral = spectral_picture(picture, scene);
+  std::optional<SpectralImage> spectral;
+  if (picture.spectra.channels > 0) spectral = spectral_picture(picture, scene);
+  Render result = render_of(scene, std::move(picture.image));
+  result.spectral = std::move(spectral);
   result.statistics.seconds_tracing = seconds_since(start);
   return result;
 }
@@ -257,16 +257,14 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
       scene.warnings.push_back(
           "`/field/eigenvalues`: the polariscope shows differences of principal values, which these change; \"auto\" "
           "keeps them");
-    if (settings().analyzer != 0 && !last_polarizer(arrangement_of(settings().arrangement).after))
+    if (settings().analyzer != 0 && !last_polarizer(settings().arrangement.after))
       scene.warnings.push_back("`/integrator/analyzer` has no effect: `after` has no polarizer that it could turn");
     scene.field.scale = 1;
     scene.bending.flexibility = {0, 0};  // Of the rays that the live view draws.
     if (scene.output.stokes && !scene.output.wants("spectral"))
       scene.warnings.push_back("`/output/stokes` has no effect without `/output/spectral`");
     const double picture = static_cast<double>(channel_names(polariscope_channels()).size()) * sizeof(float);
-    const double spectral =
-        scene.output.wants("spectral") ? channel_count(scene) * (scene.output.stokes ? 4.0 : 1.0) : 0;
-    check_receiver_memory(scene, 2 * picture + spectral * (4 * sizeof(float) + sizeof(double)), source);
+    check_receiver_memory(scene, 2 * picture + spectral_channels(scene) * (2.0 * sizeof(float) + sizeof(double)), source);
   }
 
   std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {

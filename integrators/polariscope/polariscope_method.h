@@ -13,32 +13,18 @@
 
 namespace tensorray {
 
-enum class ArrangementWord { circular, circular_light, plane, plane_light, tint };
-
-inline Choices<ArrangementWord> choices(ArrangementWord) {
-  return {{"circular", ArrangementWord::circular},
-          {"circular_light", ArrangementWord::circular_light},
-          {"plane", ArrangementWord::plane},
-          {"plane_light", ArrangementWord::plane_light},
-          {"tint", ArrangementWord::tint}};
-}
-
-using ArrangementDescription = std::variant<ArrangementWord, Arrangement>;
-TENSORRAY_VALUE(ArrangementDescription);
-
-/// The elements that a word means.
-Arrangement arrangement_of(const ArrangementDescription& description);
+TENSORRAY_VALUE(Arrangement);
 
 enum class OpticChoice { automatic };
 
 /// C, or a text file of two columns, wavelength (nm) and C; automatic: chosen by the field.
-using StressOpticDescription = std::variant<OpticChoice, double, std::filesystem::path>;
-TENSORRAY_VALUE(StressOpticDescription);
+using StressOptic = std::variant<OpticChoice, double, std::filesystem::path>;
+TENSORRAY_VALUE(StressOptic);
 
 struct PolariscopeDescription {
-  ArrangementDescription arrangement = ArrangementWord::circular;
+  Arrangement arrangement = named_arrangements().front().elements;
   double angle = 0, analyzer = 0;  ///< Degrees.
-  StressOpticDescription stress_optic = OpticChoice::automatic;
+  StressOptic stress_optic = OpticChoice::automatic;
   double unit_length = 1;      ///< Metres in a unit of world space.
   std::optional<int> samples;  ///< Of a pixel along x and y; none: 2.
 };

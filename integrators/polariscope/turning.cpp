@@ -20,154 +20,82 @@ HWY_INLINE F set(double value) { return hn::Set(Floats(), static_cast<float>(val
 HWY_INLINE F load(const float* from) { return hn::LoadU(Floats(), from); }
 HWY_INLINE void store(F value, float* to) { hn::StoreU(value, Floats(), to); }
 
-struct Complex {
-  F re, im;
-};
-HWY_INLINE Complex operator+(const Complex& a, const Complex& b) { return {a.re + b.re, a.im + b.im}; }
-HWY_INLINE Complex operator-(const Complex& a, const Complex& b) { return {a.re - b.re, a.im - b.im}; }
-HWY_INLINE Complex operator*(F a, const Complex& b) { return {a * b.re, a * b.im}; }
-HWY_INLINE Complex operator*(const Complex& a, const Complex& b) {
-  return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
-}
-HWY_INLINE Complex conjugate(const Complex& a) { return {a.re, hn::Neg(a.im)}; }
-
-struct Series {
-  Complex u[4], v[4];
-};
-
-HWY_INLINE Series load_series(const RayTurns& turns, int at) {
-  const auto part = [&](int c, int m) HWY_ATTR {
-    return Complex{load(turns.series[c][m][0] + at), load(turns.series[c][m][1] + at)};
-  };
-  return {{part(0, 0), part(0, 1), part(0, 2), part(0, 3)}, {part(1, 0), part(1, 1), part(1, 2), part(1, 3)}};
-}
-
-HWY_INLINE void store_series(const Series& s, RayTurns& turns, int at) {
-  for (int c = 0; c < 2; ++c)
-    for (int m = 0; m < 4; ++m) {
-      store(c == 0 ? s.u[m].re : s.v[m].re, turns.series[c][m][0] + at);
-      store(c == 0 ? s.u[m].im : s.v[m].im, turns.series[c][m][1] + at);
-    }
-}
-
-/// The series of a step's exponential. The square of its angle is p g² + r g⁴; the cosine, and the sine over the angle,
-/// are series in that.
-HWY_INLINE Series series_of(F alpha, F beta, F gamma) {
-  const F p = alpha * alpha + beta * beta, r = gamma * gamma, pp = p * p;
-  const F cosine[4] = {set(-1 / 2.0) * p, set(1 / 24.0) * pp - set(1 / 2.0) * r,
-                       p * (set(1 / 12.0) * r - set(1 / 720.0) * pp),
-                       pp * (set(1 / 40320.0) * pp - set(1 / 240.0) * r) + set(1 / 24.0) * r * r};
-  const F sine[4] = {set(1), set(-1 / 6.0) * p, set(1 / 120.0) * pp - set(1 / 6.0) * r,
-                     p * (set(1 / 60.0) * r - set(1 / 5040.0) * pp)};
-  Series s;
-  for (int m = 0; m < 4; ++m) {
-    s.u[m] = {cosine[m], gamma * sine[m]};
-    s.v[m] = {alpha * sine[m], hn::Neg(beta) * sine[m]};
-  }
-  return s;
-}
-
-/// The product of quaternions as far as the series go; `p` is that of the later turn.
-HWY_INLINE Series product(const Series& p, const Series& q) {
-  Series result;
-#pragma GCC unroll 4
-  for (int m = 0; m < 4; ++m) {
-    Complex u = p.u[m] + q.u[m], v = p.v[m] + q.v[m];
-#pragma GCC unroll 4
-    for (int j = 0; j <= m; ++j) u = u - conjugate(p.v[j]) * q.v[m - j];
-#pragma GCC unroll 4
-    for (int j = 0; j < m; ++j) {
-      u = u + p.u[j] * q.u[m - 1 - j];
-      v = v + conjugate(p.u[j]) * q.v[m - 1 - j] + p.v[j] * q.u[m - 1 - j];
-    }
-    result.u[m] = u;
-    result.v[m] = v;
-  }
-  return result;
-}
-
-/// Adds steps to `open`, or, if any turn would be too great, sets `next` to them: together with what is open of the
-/// other rays, so that the result for a ray does not depend on its neighbours. @return whether they are added.
-bool add_to(const RaySteps& steps, float greatest, RayTurns& open, RayTurns& next) {
+void find_turns(const RaySteps& steps, RayTurns& turns) {
   const Floats d;
-  // Of the angle: 0.75⁹ / 9! is 2e-7. Where axes turn much within a step, more is cut, but far less than the step errs.
-  const F most = set(0.75);
-  bool fits = true;
+  const hn::RebindToSigned<Floats> ints;
   for (int at = 0; at < ray_lanes; at += static_cast<int>(hn::Lanes(d))) {
     const F h = load(steps.length + at);  // Times a and b first: alone, its square may be beyond single precision.
     const F a1 = h * load(steps.a[0] + at), b1 = h * load(steps.b[0] + at);
     const F a2 = h * load(steps.a[1] + at), b2 = h * load(steps.b[1] + at);
     const F alpha = set(0.5) * (a1 + a2), beta = set(0.5) * (b1 + b2), gamma = set(gauss_point) * (a2 * b1 - a1 * b2);
-    const F z = set(greatest) * gamma, angle = set(greatest) * hn::Sqrt(alpha * alpha + beta * beta + z * z);
-    F part = set(1), squares = set(0);
-    for (int n = 0; n < 120 && !hn::AllFalse(d, hn::Gt(part * angle, most)); ++n) {
-      const auto halves = hn::Gt(part * angle, most);
-      part = hn::IfThenElse(halves, part * set(0.5), part);
-      squares = hn::IfThenElse(halves, squares + set(1), squares);
+    const F angle = hn::Sqrt(alpha * alpha + beta * beta + gamma * gamma);
+    F part = set(1);
+    auto squares = hn::Zero(ints);
+    for (int n = 0; n < 120; ++n) {
+      const auto is_large = hn::Gt(part * angle, set(0.75));  // 0.75⁹ / 9! is 2e-7: what the series below cut.
+      if (hn::AllFalse(d, is_large)) break;
+      part = hn::IfThenElse(is_large, part * set(0.5), part);
+      squares = hn::Sub(squares, hn::VecFromMask(ints, hn::RebindMask(ints, is_large)));
     }
-    fits = fits && hn::AllFalse(d, hn::Gt(load(open.angle + at) + angle, most));
-    store_series(series_of(part * alpha, part * beta, part * gamma), next, at);
-    store(angle, next.angle + at);
-    store(squares, next.squares + at);
+    store(part * alpha, turns.alpha + at);
+    store(part * beta, turns.beta + at);
+    store(part * gamma, turns.gamma + at);
+    hn::StoreU(squares, ints, turns.squares + at);
+    store(set(0.5) * (hn::Sqrt(a1 * a1 + b1 * b1) + hn::Sqrt(a2 * a2 + b2 * b2)), turns.phase + at);
   }
-  RayTurns& to = fits ? open : next;
-  for (int at = 0; at < ray_lanes; at += static_cast<int>(hn::Lanes(d))) {
-    const F before = load(open.angle + at), angle = load(next.angle + at);
-    const auto is_full = hn::Gt(before + angle, most);
-    Series so_far = load_series(open, at);
-    for (int m = 0; m < 4; ++m) {
-      so_far.u[m] = {hn::IfThenZeroElse(is_full, so_far.u[m].re), hn::IfThenZeroElse(is_full, so_far.u[m].im)};
-      so_far.v[m] = {hn::IfThenZeroElse(is_full, so_far.v[m].re), hn::IfThenZeroElse(is_full, so_far.v[m].im)};
-    }
-    store_series(product(load_series(next, at), so_far), to, at);
-    if (!fits) store(hn::IfThenElseZero(is_full, before), open.angle + at);
-    store(hn::IfThenElse(is_full, angle, before + angle), to.angle + at);
-  }
-  return fits;
 }
 
-/// The sum of c_m G^m. @param c  Of a ray.
-HWY_INLINE Complex sum_of(const float (&c)[4][2][ray_lanes], std::size_t ray, F G) {
-  Complex sum{set(c[3][0][ray]), set(c[3][1][ray])};
-  for (int m = 2; m >= 0; --m) sum = G * sum + Complex{set(c[m][0][ray]), set(c[m][1][ray])};
-  return sum;
+/// A unitary matrix, but for its length, as a quaternion.
+struct Quaternion {
+  F w, x, y, z;
+};
+
+HWY_INLINE Quaternion operator*(const Quaternion& p, const Quaternion& q) {
+  const auto sum = [](F a, F b, F c, F d, F e, F f, F g, F h)
+                       HWY_ATTR { return hn::MulAdd(a, b, hn::MulAdd(c, d, hn::NegMulAdd(g, h, e * f))); };
+  return {hn::NegMulAdd(p.x, q.x, hn::NegMulAdd(p.y, q.y, hn::NegMulAdd(p.z, q.z, p.w * q.w))),
+          sum(p.w, q.x, p.x, q.w, p.y, q.z, p.z, q.y), sum(p.w, q.y, p.y, q.w, p.z, q.x, p.x, q.z),
+          sum(p.w, q.z, p.z, q.w, p.x, q.y, p.y, q.x)};
+}
+
+HWY_INLINE Quaternion quaternion_of(const RayTurns& turns, std::size_t ray, F g) {
+  const F alpha = set(turns.alpha[ray]), beta = set(turns.beta[ray]), gamma = g * set(turns.gamma[ray]);
+  const F x = g * g * (alpha * alpha + beta * beta + gamma * gamma);  // The square of the angle.
+  const F sine = g * (set(1) + x * (set(-1 / 6.0) + x * (set(1 / 120.0) + x * set(-1 / 5040.0))));
+  // With w − 1 for w, which has few digits of small angles.
+  Quaternion q{x * (set(-0.5) + x * (set(1 / 24.0) + x * (set(-1 / 720.0) + x * set(1 / 40320.0)))), alpha * sine,
+               beta * sine, gamma * sine};
+  for (int n = 0; n < turns.squares[ray]; ++n) {
+    const F twice = set(2) * q.w + set(2), squares = q.x * q.x + q.y * q.y + q.z * q.z;
+    // Beyond a quarter turn, 1 + w has few digits.
+    q = {hn::IfThenElse(hn::Lt(q.w, set(-1)), set(-2) * squares, q.w * (twice + set(2))), twice * q.x, twice * q.y,
+         twice * q.z};
+  }
+  q.w = q.w + set(1);
+  return q;
 }
 
 void take_turns(const RayTurns* turns, std::size_t count, std::size_t ray, const float* strengths, std::size_t room,
-                float* planes) {
-  const F zero = set(0), two = set(2);
+                float weight, float* quaternions, float* light) {
   for (std::size_t at = 0; at < room; at += hn::Lanes(Floats())) {
-    const F g = load(strengths + at), G = g * g;
-    Complex U{set(1), zero}, V{zero, zero};
-    for (const RayTurns* turn = turns; turn != turns + count; ++turn) {
-      if (turn->angle[ray] == 0) continue;
-      Complex u = G * sum_of(turn->series[0], ray, G), v = g * sum_of(turn->series[1], ray, G);
-      for (float n = 0; n < turn->squares[ray]; ++n) {  // With w − 1 for w, which has few digits of small angles.
-        const F twice = two * u.re + two;
-        const F sine =
-            v.re * v.re + v.im * v.im + u.im * u.im;  // Squared: beyond a quarter turn, 1 + w has few digits.
-        u = {hn::IfThenElse(hn::Lt(u.re, set(-1)), set(-2) * sine, u.re * (twice + two)), twice * u.im};
-        v = twice * v;
-      }
-      u.re = u.re + set(1);
-      const Complex first = U;
-      U = u * first - conjugate(v) * V;
-      V = conjugate(u) * V + v * first;
-    }
-    const F scale = set(1) / hn::Sqrt(U.re * U.re + U.im * U.im + V.re * V.re + V.im * V.im);
-    const F q[4] = {U.re, V.re, hn::Neg(V.im), U.im};
-    for (std::size_t c = 0; c < 4; ++c) store(q[c] * scale, planes + c * room + at);
-  }
-}
-
-void add_all(const float* planes, float weight, std::size_t room, float* rotations) {
-  for (std::size_t at = 0; at < room; at += hn::Lanes(Floats())) {
-    const F one = set(weight), two = set(2 * weight), w = load(planes + at), x = load(planes + room + at);
-    const F y = load(planes + 2 * room + at), z = load(planes + 3 * room + at);
-    const F entries[9] = {one - two * (y * y + z * z), two * (x * y - w * z),       two * (x * z + w * y),
-                          two * (x * y + w * z),       one - two * (x * x + z * z), two * (y * z - w * x),
-                          two * (x * z - w * y),       two * (y * z + w * x),       one - two * (x * x + y * y)};
-    for (std::size_t i = 0; i < 9; ++i) store(load(rotations + i * room + at) + entries[i], rotations + i * room + at);
+    Quaternion q{set(1), set(0), set(0), set(0)};
+    for (std::size_t i = 0; i < count; ++i) q = quaternion_of(turns[i], ray, load(strengths + at)) * q;
+    const F scale = set(1) / hn::Sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+    const F w = scale * q.w, x = scale * q.x, y = scale * q.y, z = scale * q.z;
+    const F unit[4] = {w, x, y, z};
+    for (std::size_t c = 0; c < 4; ++c) store(unit[c], quaternions + c * room + at);
+    const F one = set(weight), t = set(2 * weight);
+    const F more[10] = {one - t * (y * y + z * z),
+                        t * (x * y - w * z),
+                        t * (x * z + w * y),  //
+                        t * (x * y + w * z),
+                        one - t * (x * x + z * z),
+                        t * (y * z - w * x),  //
+                        t * (x * z - w * y),
+                        t * (y * z + w * x),
+                        one - t * (x * x + y * y),  //
+                        one};
+    for (std::size_t i = 0; i < 10; ++i) store(load(light + i * room + at) + more[i], light + i * room + at);
   }
 }
 
@@ -178,23 +106,18 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tensorray {
 
-HWY_EXPORT(add_to);
+HWY_EXPORT(find_turns);
 HWY_EXPORT(take_turns);
-HWY_EXPORT(add_all);
 
-void add_steps(const RaySteps& steps, double greatest, std::vector<RayTurns>& turns) {
-  RayTurns next;
-  if (turns.empty()) turns.emplace_back();
-  if (!HWY_DYNAMIC_DISPATCH(add_to)(steps, static_cast<float>(greatest), turns.back(), next)) turns.push_back(next);
+RayTurns turns_of(const RaySteps& steps) {
+  RayTurns turns;
+  HWY_DYNAMIC_DISPATCH(find_turns)(steps, turns);
+  return turns;
 }
 
-void turn(const std::vector<RayTurns>& turns, std::size_t ray, const float* strengths, std::size_t room,
-          float* planes) {
-  HWY_DYNAMIC_DISPATCH(take_turns)(turns.data(), turns.size(), ray, strengths, room, planes);
-}
-
-void add_rotations(const float* planes, float weight, std::size_t room, float* rotations) {
-  HWY_DYNAMIC_DISPATCH(add_all)(planes, weight, room, rotations);
+void turn(const std::vector<RayTurns>& turns, std::size_t ray, const float* strengths, std::size_t room, float weight,
+          float* quaternions, float* light) {
+  HWY_DYNAMIC_DISPATCH(take_turns)(turns.data(), turns.size(), ray, strengths, room, weight, quaternions, light);
 }
 
 }  // namespace tensorray

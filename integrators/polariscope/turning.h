@@ -20,29 +20,27 @@ struct RaySteps {
 /// Gauss' points of a step are before and behind its middle by this part of its length.
 constexpr double gauss_point = 0.28867513459481287;
 
-/// What parts of rays do to light of relative strength g, the phase by which a wavelength is turned compared with a
-/// reference. The matrix of a step is the exponential of
+/// What steps do to light of relative strength g, the phase by which a wavelength is turned compared with the one that
+/// is turned most (−1 ≤ g ≤ 1). The matrix of a step is the exponential of
 ///   −i (g α σ_z + g β σ_x + g² γ σ_y),
-/// Magnus' exponent of fourth order, whose last part is the turning of the axes. With u = w + i z and v = x − i y for
-/// its quaternion (elements.h), products of such are power series in g, which all wavelengths share:
-///   u = 1 + Σ u_m g^(2m+2),  v = Σ v_m g^(2m+1),  m = 0 to 3.
+/// Magnus' exponent of fourth order, whose last part is the turning of the axes.
 struct RayTurns {
-  float series[2][4][2][ray_lanes];  ///< u, then v; m; real, then imaginary parts.
-  float angle[ray_lanes];            ///< Of all steps, for the greatest strength. Where it is 0, nothing turns.
-  float squares[ray_lanes];          ///< The quaternion is squared so many times.
+  float alpha[ray_lanes], beta[ray_lanes], gamma[ray_lanes];  ///< Of a part of the step: its angle is small, ...
+  int squares[ray_lanes];                                     ///< ... and its matrix is squared so many times.
+  float phase[ray_lanes];                                     ///< ∫√(a² + b²) dz of the whole step.
 };
 
-/// Adds a step of each ray. @param turns  In the order of the light. @param greatest  Of the strengths.
-void add_steps(const RaySteps& steps, double greatest, std::vector<RayTurns>& turns);
+/// @param steps  With a and b of g = 1.
+RayTurns turns_of(const RaySteps& steps);
 
 /// Arrays of wavelengths have room for this count of numbers.
 constexpr std::size_t turning_room(std::size_t count) { return (count + 15) / 16 * 16; }
 
-/// The products of a ray's turns, as quaternions of unit length.
-/// @param strengths  As many as there is `room`. @param planes  w, x, y, z: each `room` numbers.
-void turn(const std::vector<RayTurns>& turns, std::size_t ray, const float* strengths, std::size_t room, float* planes);
-
-/// Adds the rotations of quaternions, times `weight`: nine planes, row by row.
-void add_rotations(const float* planes, float weight, std::size_t room, float* rotations);
+/// Finds the product of a ray's turns, as quaternions of unit length (elements.h), and adds their rotations, times
+/// `weight`, and the weight itself.
+/// @param turns  In the order of the light. @param strengths  g of as many wavelengths as there is `room`.
+/// @param quaternions  w, x, y, z: each `room` numbers. @param light  Ten planes of `room` numbers (LightRow).
+void turn(const std::vector<RayTurns>& turns, std::size_t ray, const float* strengths, std::size_t room, float weight,
+          float* quaternions, float* light);
 
 }  // namespace tensorray

@@ -27,21 +27,6 @@ Geometry without_plate(const Scene& scene) {
   return Geometry(std::move(surfaces));
 }
 
-/// The bounding rectangle of the beam's aperture, in the plane where the light reaches the volume first.
-Plate entry_plane(const Scene& scene, int pixels) {
-  Eigen::AlignedBox2d aperture;
-  for (const Eigen::Vector2d& corner : scene.beam.aperture) aperture.extend(corner);
-  Plate plane;
-  plane.center = scene.beam.center +
-                 depth_range(scene.field, scene.beam.center, scene.beam.direction).near * scene.beam.direction +
-                 aperture.center().x() * scene.beam.right + aperture.center().y() * scene.beam.up;
-  plane.up = scene.beam.up;
-  plane.right = plane.up.cross(-scene.beam.direction);
-  plane.size = aperture.sizes();
-  plane.resolution = (pixels * plane.size / plane.size.maxCoeff()).array().round().max(1).matrix().cast<int>();
-  return plane;
-}
-
 /// Settings for light of one flexibility along the beam. @throw SceneError if its length is 0.
 StretchSettings settings_of(const Scene& scene, const StretchDescription& description) {
   const BendingDescription& bending = scene.description.bending;
@@ -119,7 +104,8 @@ class LoadedStretch : public LoadedMethod {
       result.grids.back().metadata.insert(metadata.begin(), metadata.end());
     }
     if (output.wants("image") || output.wants("exr")) {
-      const Plate plane = entry_plane(scene, description_.pixels);
+      const DepthRange depths = depth_range(scene.field, scene.beam.center, scene.beam.direction);
+      const Plate plane = plate_across(scene.beam, depths.near, description_.pixels);
       if (job)
         settings.show = [&](const std::vector<float>& picture) {
           if (!job->takes_picture_request()) return;

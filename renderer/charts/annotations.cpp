@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "base/constants.h"
 #include "renderer/charts/color_bar.h"
 #include "renderer/charts/ink.h"
 #include "renderer/charts/lettering.h"
@@ -150,6 +151,20 @@ void draw_axes(Image& image, const Vector3d& right, const Vector3d& up) {
     for (Mark& mark : axis_marks(axis, {right[axis], up[axis], towards[axis]}, sizes)) marks.push_back(std::move(mark));
   shift(Vector2d::Constant(sizes.margin) - extent_of(marks).min(), marks);
   draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
+}
+
+void draw_directions(Image& image, const std::vector<std::pair<std::string, double>>& directions) {
+  const Sizes sizes(image);
+  const double from_corner = sizes.margin + 4 * sizes.letter;
+  const Vector2d center(image.width - from_corner, from_corner);
+  std::vector<Mark> marks;
+  for (const auto& [text, angle] : directions) {
+    const Vector2d along(std::cos(angle * pi / 180), -std::sin(angle * pi / 180)), tip = 2 * sizes.letter * along;
+    const Vector2d corner(-text_width(text, sizes.letter) / 2, sizes.letter / 2);
+    marks.push_back({center - tip, center + tip, "", sizes.line});
+    marks.push_back({center + 1.5 * tip + corner, {}, text, sizes.letter});
+  }
+  if (!marks.empty()) draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
 }
 
 void draw_outline(Image& image, const std::vector<OutlineStroke>& strokes, bool visible, bool hidden) {

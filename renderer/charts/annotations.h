@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -31,6 +32,10 @@ void draw_caption(Image& image, const std::string& text);
 /// that points at the viewer is a dot, one that points away is a cross.
 /// @param right, up  Directions of the picture in the world; unit, normal to each other.
 void draw_axes(Image& image, const Eigen::Vector3d& right, const Eigen::Vector3d& up);
+
+/// Draws lines through one point in the upper right corner, each with a text at one end, and its angle from right to
+/// up, degrees.
+void draw_directions(Image& image, const std::vector<std::pair<std::string, double>>& directions);
 
 /// Colours from left to right, and what they mean.
 struct ColorStrip {

@@ -25,10 +25,10 @@ namespace tensorray {
 /// @param threads   How many compress at once; 0: all. They are OpenEXR's own, of which a process has one pool.
 std::vector<unsigned char> encode_exr(const Image& image, const ImageMetadata& metadata, int threads);
 
-/// A PNG of 16 bits, marked as sRGB unless the metadata `oiio:ColorSpace` says otherwise.
+/// A PNG of 8 or 16 bits, marked as sRGB unless the metadata `oiio:ColorSpace` says otherwise.
 /// @param image     One channel (grey), three (RGB) or four (RGBA, colours not multiplied by alpha); values in [0, 1].
 /// @param metadata  All becomes text; names longer than 79 characters are left out: the format has no place for them.
-std::vector<unsigned char> encode_png(const Image& image, const ImageMetadata& metadata);
+std::vector<unsigned char> encode_png(const Image& image, const ImageMetadata& metadata, int bits = 16);
 
 /// cICP, sRGB, gAMA and cHRM of a PNG, without those that are damaged; nothing if the file is no PNG. OpenImageIO 2.4
 /// does not pass on chromaticities and code points, and libpng prints a line of its own about damaged files.

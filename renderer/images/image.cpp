@@ -187,6 +187,11 @@ void write_image(const std::filesystem::path& path, const Image& image, const Im
   }
 }
 
+std::vector<unsigned char> encode_for_screen(const Image& image) {
+  check_size(image);
+  return encode_png(clipped(image, true), {}, 8);
+}
+
 Image read_image(const std::filesystem::path& path) {
   return read(path, [&](const std::optional<ColorTags>&) { return ready_library().decode(path); });
 }

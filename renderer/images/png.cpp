@@ -30,20 +30,21 @@ std::string text_name(const std::string& attribute) {
 
 /// What is written beside the pixels. libpng reports errors by a jump, over which nothing may be destroyed.
 struct Contents {
-  int color_type = 0;
+  int color_type = 0, bits = 16;
   bool is_srgb = true;
   std::string icc_profile;  // Empty: none.
   std::vector<std::pair<std::string, std::string>> texts;
-  Bytes row;  // Values of 16 bits, high byte first.
+  Bytes row;  // Values of 8 bits, or of 16, high byte first.
 };
 
-Contents contents_of(const Image& image, const ImageMetadata& metadata) {
+Contents contents_of(const Image& image, const ImageMetadata& metadata, int bits) {
   Contents contents;
+  contents.bits = bits;
   const std::size_t channels = image.channels.size();
   contents.color_type = channels == 1   ? PNG_COLOR_TYPE_GRAY
                         : channels == 3 ? PNG_COLOR_TYPE_RGB
                                         : PNG_COLOR_TYPE_RGB_ALPHA;
-  contents.row.resize(2 * channels * static_cast<std::size_t>(image.width));
+  contents.row.resize(static_cast<std::size_t>(bits / 8) * channels * static_cast<std::size_t>(image.width));
   const auto space = metadata.find(color_space);
   contents.is_srgb = space == metadata.end() || space->second == "sRGB";
   if (metadata.count(profile) > 0) contents.icc_profile = metadata.at(profile);
@@ -55,9 +56,11 @@ Contents contents_of(const Image& image, const ImageMetadata& metadata) {
   return contents;
 }
 
-void set_row(const Image& image, int y, Bytes& row) {
+void set_row(const Image& image, int y, int bits, Bytes& row) {
   const float* const values = image.pixel(0, y);
-  for (std::size_t i = 0; i < row.size(); i += 2) {
+  for (std::size_t i = 0; bits == 8 && i < row.size(); ++i)
+    row[i] = static_cast<unsigned char>(values[i] * 255.0f + 0.5f);
+  for (std::size_t i = 0; bits == 16 && i < row.size(); i += 2) {
     const auto number = static_cast<unsigned>(values[i / 2] * 65535.0f + 0.5f);
     row[i] = static_cast<unsigned char>(number >> 8);
     row[i + 1] = static_cast<unsigned char>(number);
@@ -75,7 +78,8 @@ bool write(png_structp png, png_infop info, const Image& image, Contents& conten
   png_set_user_limits(png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
   // Runs of equal bytes are all that is looked for: that is several times as fast, and these pictures have little else.
   png_set_compression_strategy(png, Z_RLE);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width), static_cast<png_uint_32>(image.height), 16,
+  if (contents.bits == 8) png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);  // Trying all takes longer.
+  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width), static_cast<png_uint_32>(image.height), contents.bits,
                contents.color_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   if (contents.is_srgb) png_set_sRGB_gAMA_and_cHRM(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
   if (!contents.icc_profile.empty())
@@ -85,7 +89,7 @@ bool write(png_structp png, png_infop info, const Image& image, Contents& conten
   png_set_text(png, info, texts.data(), static_cast<int>(texts.size()));
   png_write_info(png, info);
   for (int y = 0; y < image.height; ++y) {
-    set_row(image, y, contents.row);
+    set_row(image, y, contents.bits, contents.row);
     png_write_row(png, contents.row.data());
   }
   png_write_end(png, info);
@@ -127,8 +131,8 @@ void add_tag(const std::string& name, const std::string& data, ColorTags& tags) 
 
 }  // namespace
 
-std::vector<unsigned char> encode_png(const Image& image, const ImageMetadata& metadata) {
-  Contents contents = contents_of(image, metadata);
+std::vector<unsigned char> encode_png(const Image& image, const ImageMetadata& metadata, int bits) {
+  Contents contents = contents_of(image, metadata, bits);
   std::vector<png_text> texts;
   std::string no_language;
   for (auto& [name, text] : contents.texts) {

@@ -7,7 +7,6 @@
 
 #include "base/geometry/box.h"
 #include "renderer/sampling/random.h"
-#include "renderer/surfaces/plate.h"
 
 namespace tensorray {
 namespace {
@@ -54,6 +53,18 @@ double area(const std::vector<Eigen::Vector2d>& polygon) {
   double twice = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) twice += cross(polygon[i], polygon[(i + 1) % polygon.size()]);
   return twice / 2;
+}
+
+Plate plate_across(const Beam& beam, double depth, int pixels) {
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : beam.aperture) box.extend(corner);
+  Plate plate;
+  plate.center = beam.start(box.center()) + depth * beam.direction;
+  plate.right = beam.right;
+  plate.up = beam.up;
+  plate.size = box.sizes();
+  plate.resolution = (pixels * plate.size / plate.size.maxCoeff()).array().round().max(1).matrix().cast<int>();
+  return plate;
 }
 
 Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& direction,

@@ -8,6 +8,8 @@
 
 #include <Eigen/Geometry>
 
+#include "renderer/surfaces/plate.h"
+
 namespace tensorray {
 
 enum class BeamPattern { grid, stratified, sobol, random };
@@ -50,6 +52,10 @@ double start_ratio(const Beam& beam, const Eigen::Vector3d& point);
 double start_area(const Beam& beam, const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c);
 
 double area(const std::vector<Eigen::Vector2d>& polygon);
+
+/// The bounding rectangle of the aperture, as it is seen along the light. @param depth  From the plane where the light
+/// starts. @param pixels  Along the longer side.
+Plate plate_across(const Beam& beam, double depth, int pixels);
 
 /// One position where light starts.
 struct Emission {

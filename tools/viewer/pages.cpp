@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
-#include <future>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
@@ -105,8 +104,6 @@ Pages::Pages(const ViewedScene& viewed, const Progress& progress)
       live_(viewed.file) {
   const SceneDescription description = read_scene_json(scene_, viewed.file);
   require_distinct_files(input_files(description), {{viewed.copy, "the file that a page saves to"}});
-  // Coarse pictures are JPEG. Errors come with the first one.
-  const auto images = std::async(std::launch::async, prepare_images, std::vector<std::filesystem::path>{"page.jpg"});
   live_.load(scene_, outputs_of(description, {}, folder_ / ""), progress);
   field_ = describe_field(live_.scene());
   thread_ = std::thread([this] { work(); });
@@ -303,8 +300,6 @@ void Pages::end_work() {
 void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading) {
   const Scene& scene = live_.scene();
   const Render& render = *page.render;
-  const char* const ending = stage.is_final() ? ".png" : ".jpg";
-  const std::filesystem::path file = folder_ / (std::string("shown") + ending);
   auto start = Clock::now();
   page.display = display_image(scene, render, false);
   const Statistics& statistics = render.statistics;
@@ -313,7 +308,7 @@ void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading)
               {"light", statistics.seconds_density + statistics.seconds_drawing},
               {"color", statistics.seconds_color + seconds_since(start)}};
   start = Clock::now();
-  write_image(file, page.display);
+  const std::vector<unsigned char> png = encode_for_screen(page.display);
   phases["encode"] = seconds_since(start);
   double seconds = 0;
   for (const Json& phase : phases) seconds += phase.get<double>();
@@ -327,14 +322,14 @@ void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading)
                     {"height", page.display.height},
                     {"full_width", page.display.width * stage.coarseness},
                     {"full_height", page.display.height * stage.coarseness},
-                    {"format", stage.is_final() ? "image/png" : "image/jpeg"},
+                    {"format", "image/png"},
                     {"seconds", seconds},
                     {"phases", phases},
                     {"chosen", describe_choices(scene, render)},
                     {"examples", describe_examples(scene)},
                     {"notes", scene.notes},
                     {"warnings", render.warnings}};
-  page.send(binary_message(header, bytes_of(file), true));
+  page.send(binary_message(header, {png.begin(), png.end()}, true));
 }
 
 /// @param renders  Whether a picture of this page is being made: only requests that need no other scene are answered.
