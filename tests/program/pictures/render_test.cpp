@@ -177,7 +177,7 @@ TEST_F(FieldAlone, FilesThatHaveToBeImportedAreRenderedAsTheyAreAfterAnImport) {
       {"the input", {"derive", "tensors.nrrd", "mask.nii", "--invariant", "trace", "-o", "mask.nii"}},
       {"the input", {"render", "tensors.nrrd", "mask.nii", "-o", "mask.nii"}},
       {"the input", {"render", "tensors.nrrd", "m.noise.nii", "-o", "m.nii", "--split"}},
-      {"there are", {"derive", "noise.vti", "--invariant", "bogus", "-o", "a.vdb"}},
+      {"no invariant", {"derive", "noise.vti", "--invariant", "bogus", "-o", "a.vdb"}},
       {"belong together", {"explore", "noise.vti", "--pick", "3", "-o", "a.png"}},
       {"tensors.nrrd mask.nii -o", {"render", "tensors.nrrd", "mask.nii", "--save-scene", "a.json"}}};
   write("noise.vti", "noise");
@@ -185,7 +185,7 @@ TEST_F(FieldAlone, FilesThatHaveToBeImportedAreRenderedAsTheyAreAfterAnImport) {
   for (const auto& [text, arguments] : early) expect_error(text, arguments);
   EXPECT_EQ(read_file(in_folder("mask.nii")), "a mask");
   expect_error("case.foam", {"render", "case.foam", "--gradient-of", "U"});
-  expect_error("leave --", {"render", "tensors.nrrd", "--voxel-size", "1", "1", "2"});
+  expect_error("three edges", {"render", "tensors.nrrd", "--voxel-size", "1", "1", "2"});
 
   expect_error("tensorray import", {"render", "tensors.nrrd", "--save-scene", "scene.json"});
   expect_error("--stats", {"render", "tensors.nrrd", "--stats", "tensors.nrrd"});
