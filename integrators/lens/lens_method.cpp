@@ -280,6 +280,8 @@ class LensMethod : public MethodWith<LensDescription> {
     // the other depths, and of all side by side, the pictures.
     const auto& depth = settings().plane.depth;
     const double more = depth && !depth->empty() ? static_cast<double>(depth->size() - 1) : 0;
+    if (more > 0 && scene.output.wants("maps"))
+      source.fail("`/output/maps` are of one image plane; give one `/integrator/image_plane/depth`");
     const double picture = static_cast<double>(channel_names(lens_channels()).size()) * sizeof(float);
     const double spectral = scene.output.wants("spectral") ? channel_count(scene) : 0;
     const double map = starts_per_pixel * 3 * sizeof(double);

@@ -15,30 +15,19 @@
 namespace tensorray {
 namespace {
 
-/// The ending of `file` that selects this kind on the command line; empty if none does.
-std::string matching_ending(const Output& kind, const std::filesystem::path& file) {
-  const std::vector<std::string> endings =
-      kind.option_ending ? std::vector<std::string>{kind.option_ending} : kind.endings;
-  const auto found = std::find_if(endings.begin(), endings.end(),
-                                  [&](const std::string& ending) { return ends_with(file.string(), ending); });
-  return found == endings.end() ? "" : *found;
-}
-
 /// The kind with the longest matching ending; null if no ending matches.
 const Output* best_kind(const std::filesystem::path& file, const std::vector<Output>& kinds) {
   const auto best = std::max_element(kinds.begin(), kinds.end(), [&](const Output& a, const Output& b) {
-    return matching_ending(a, file).size() < matching_ending(b, file).size();
+    return a.ending_of(file).size() < b.ending_of(file).size();
   });
-  return matching_ending(*best, file).empty() ? nullptr : &*best;
+  return best->ending_of(file).empty() ? nullptr : &*best;
 }
 
 [[noreturn]] void refuse_ending(const std::filesystem::path& file, const std::vector<Output>& kinds,
                                 const Method& method) {
   std::vector<std::string> known;
-  for (const Output& kind : kinds) {
-    if (kind.option_ending) known.emplace_back(kind.option_ending);
-    if (!kind.option_ending) known.insert(known.end(), kind.endings.begin(), kind.endings.end());
-  }
+  for (const Output& kind : kinds)
+    for (const std::string& ending : kind.option_endings()) known.push_back(ending);
   throw SceneError(
       printable(fmt::format("-o {}: unknown ending; {} can write {}", file.string(), method.name(), joined(known))));
 }
@@ -80,14 +69,14 @@ Json scene_of_field(const std::filesystem::path& field) {
 
 bool is_field_file(const std::filesystem::path& path) { return path.extension() == ".vdb"; }
 
-Json scene_json(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
-  Json json = is_field_file(path) ? scene_of_field(path) : read_json_object(path);
+Json scene_json(const std::filesystem::path& path, const std::vector<std::string>& overrides, bool is_imported) {
+  Json json = is_imported || is_field_file(path) ? scene_of_field(path) : read_json_object(path);
   for (const std::string& change : overrides) apply_override(json, change);
   return json;
 }
 
 SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes) {
-  return read_scene_json(scene_json(path, changes.overrides), path, changes);
+  return read_scene_json(scene_json(path, changes.overrides, !changes.imported.empty()), path, changes);
 }
 
 SceneDescription read_scene_json(Json json, const std::filesystem::path& path, const SceneChanges& changes) {
@@ -106,11 +95,24 @@ SceneDescription read_scene_json(Json json, const std::filesystem::path& path, c
   SectionReader reader(json, "", source);
   describe(scene, reader);
   reader.finish();
+  scene.field.imported = changes.imported;
   scene.output.caption = with_values(scene.output.caption, json, source);
   replace_outputs(scene, outputs);
   choose_outputs(scene, changes.frame);
   check_scene(scene, json, source);
   return scene;
+}
+
+void require_same_folder(const std::filesystem::path& scene, const std::filesystem::path& copy) {
+  if (copy.empty() || is_field_file(scene)) return;
+  const auto folder = [](const std::filesystem::path& file) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file).parent_path());
+  };
+  if (folder(scene) != folder(copy))
+    throw SceneError(
+        printable(fmt::format("--save-scene {}: must be in the folder of {}, to which paths in it are "
+                              "relative",
+                              copy.string(), scene.string())));
 }
 
 std::string scene_schema(SchemaKind kind) {

@@ -26,6 +26,9 @@ struct SceneChanges {
 
   /// The frame of a scene that changes (set_frame); # in `outputs` is its number, too. None: no keyframes are allowed.
   std::optional<int> frame = std::nullopt;
+
+  /// The field that was made of the file, which is another program's; empty: the file is a scene or a field.
+  std::filesystem::path imported = {};
 };
 
 /// Whether a path names a field, an OpenVDB file, and not a scene.
@@ -38,10 +41,15 @@ bool is_field_file(const std::filesystem::path& path);
 SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes = {});
 
 /// The first step of read_scene: the scene as JSON, with `overrides` applied, and otherwise unchecked.
-Json scene_json(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
+Json scene_json(const std::filesystem::path& path, const std::vector<std::string>& overrides = {},
+                bool is_imported = false);
 
 /// The other step: JSON → SceneDescription. @param changes  Its overrides have no effect.
 SceneDescription read_scene_json(Json json, const std::filesystem::path& path, const SceneChanges& changes = {});
+
+/// Paths in a scene are relative to its folder. @param copy  Of the scene; empty: there is none.
+/// @throw SceneError if it is in another folder; that of a field has no relative paths.
+void require_same_folder(const std::filesystem::path& scene, const std::filesystem::path& copy);
 
 /// Whether numbers may have keyframes, as in a scene of which frames are rendered.
 enum class SchemaKind { one_frame, with_keyframes };

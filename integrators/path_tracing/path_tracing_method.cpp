@@ -246,7 +246,9 @@ void PathTracingMethod::check(SceneDescription& scene, const Json& json, const S
     source.fail("`/integrator/radius`: `min` must not exceed `max`");
   if (!chosen) return;
   if (!given(json, "/output/annotations")) {
-    scene.output.annotations = {Annotation::scale, Annotation::legend};
+    scene.output.annotations = {Annotation::scale};
+    if (paths.color.legend || !given(json, "/integrator/color/legend"))
+      scene.output.annotations.push_back(Annotation::legend);
     scene.output.default_annotations = true;
   }
   if (scene.bending.settings.max_steps > 1'000'000)

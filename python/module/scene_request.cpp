@@ -44,8 +44,7 @@ Json json_of(const SceneRequest& request) {
 std::filesystem::path name_of(const std::string& key, const OutputDescription& output) {
   std::vector<std::string> known;
   for (const Output& kind : output.kinds) {
-    if (key == kind.key)
-      return "kept in memory" + (kind.option_ending ? std::string(kind.option_ending) : kind.endings[0]);
+    if (key == kind.key) return "kept in memory" + kind.option_endings().front();
     known.emplace_back(kind.key);
   }
   throw std::invalid_argument("keep: unknown output `" + escaped(key) + "`; there are " + joined(known));

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import os
 import shutil
 import subprocess
@@ -228,16 +229,26 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
         return Field._of(_tensorray.read_field(vdb, keys, "", "none", None), keys)
 
 
-def imported(scene, field, choices, progress):
-    """The scene and the field to take, where the scene may be a file, or a list of files, for import_file."""
+def imported(function, scene, field, frame, choices, progress, outputs=()):
+    """The scene, the field and the frame to take, where the scene may be a file, or a list of files, for import_file.
+    A `frame` that is a word is that of the import. `outputs` must not be files that are read."""
+    if isinstance(frame, str):
+        choices, frame = {**choices, "frame": frame}, None
+    for name in choices:
+        if name not in inspect.signature(import_file).parameters or name in ("files", "progress"):
+            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}")
     files = scene if isinstance(scene, (list, tuple)) else [scene]
     if isinstance(scene, (list, tuple)) or isinstance(scene, (str, os.PathLike)) and needs_import(scene):
         if field is not None:
             raise ValueError("field: the scene is a file that is imported as one; give one of them")
-        return None, import_file(*files, **choices, progress=progress)
+        read = [file for file in [*files, choices.get("mask")] if file is not None and os.path.exists(file)]
+        for output in outputs:
+            if os.path.exists(output) and any(os.path.samefile(output, file) for file in read):
+                raise ValueError(f"outputs: {os.fspath(output)} is a file that is read; choose another")
+        return None, import_file(*files, **choices, progress=progress), frame
     if choices:
         raise ValueError(f"imports: only files that have to be imported have these choices: {', '.join(choices)}")
-    return scene, field
+    return scene, field, frame
 
 
 def needs_import(file):
@@ -247,8 +258,10 @@ def needs_import(file):
         return True
     if name.endswith(".vdb") or name.lower().endswith(".json") or not os.path.isfile(name):
         return False
+    if name.lower().endswith(".foam") or os.path.basename(name) == "controlDict":  # They begin with comments.
+        return True
     with open(name, "rb") as stream:
-        return stream.read(4096).lstrip()[:1] not in (b"", b"{", b"/")
+        return stream.read(4096).lstrip()[:1] not in (b"{", b"/")
 
 
 def programs():

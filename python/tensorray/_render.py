@@ -22,7 +22,7 @@ _PHOTON = np.dtype([("position", "f4", 3), ("direction", "f4", 3), ("origin", "f
 
 
 def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: Path | Sequence[Path] = (),
-           keep: str | Sequence[str] = (), changes: Changes = None, frame: int | None = None, seed: int | None = None,
+           keep: str | Sequence[str] = (), changes: Changes = None, frame: int | str | None = None, seed: int | None = None,
            threads: int = 0, folder: Path | None = None, smooth: float | None = None,
            imports: Mapping[str, Any] | None = None, shards: int | None = None, executor: Executor | None = None,
            shard_folder: Path | None = None, progress: Progress = None, **choices: Any) -> Render:
@@ -43,7 +43,7 @@ def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: 
     folder    Relative paths in a dictionary are relative to this folder; None: the working folder.
     smooth    Deviation of the Gaussian that smooths the field first, voxels; None: the scene's `field.smooth`.
     choices   Arguments of tr.import_file, if `scene` is a file for it: tr.render("plate.vtu", order="vtk"). `imports`
-              is a dictionary of them.
+              is a dictionary of them. A `frame` that is a word, as "fsl", is one, too.
     shards    Number of parts that the work is divided into, as by --shard of the command line; None: it is not divided.
               The result has the same bits.
     executor  What makes the shards: an object whose `submit` returns futures, as a ProcessPoolExecutor or Dask's
@@ -59,10 +59,10 @@ def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: 
         raise ValueError("executor, shard_folder: give the number of shards, too, as shards=4")
     if isinstance(scene, Field) and field is None:
         scene, field = None, scene
-    scene, field = imported(scene, field, {**(imports or {}), **choices}, progress)
+    files = [outputs] if isinstance(outputs, (str, os.PathLike)) else outputs
+    scene, field, frame = imported("render", scene, field, frame, {**(imports or {}), **choices}, progress, files)
     if smooth is not None:
         changes = {**(changes or {}), "field.smooth": smooth}
-    files = [outputs] if isinstance(outputs, (str, os.PathLike)) else outputs
     arguments = {"function": "render", "scene": scene, "field": field, "changes": changes, "frame": frame,
                  "folder": folder, "seed": seed, "outputs": [os.fspath(name) for name in files],
                  "keep": list(dict.fromkeys(["image", "exr", *([keep] if isinstance(keep, str) else keep)]))}

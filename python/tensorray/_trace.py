@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
-from typing import Any, Literal
+from typing import Any, Literal, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,8 +73,8 @@ def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLik
     step         Voxels a step; None: chosen along the ray.
     max_steps    Steps after which a ray is given up.
     max_length   Length after which a ray ends, world units; None: no limit.
-    eigenvalues  Preprocessing: auto (absolute where the field is symmetric, else raw; it is printed which), raw, absolute
-                 or positive.
+    eigenvalues  Preprocessing: auto (absolute where the field is symmetric and not negated, else raw; it is printed
+                 which), raw, absolute or positive.
     smooth       Standard deviation of a Gaussian that smooths the field first, voxels; 0: none.
     interpolation
                  What the field is between its voxels: cubic (smooth) or linear.
@@ -157,17 +157,17 @@ class Landings:
 
 
 def landings(scene: Scene = None, field: Field | None = None, s: ArrayLike | None = None, *, tolerance: float = 0.5,
-             changes: Changes = None, frame: int | None = None, threads: int = 0, folder: Path | None = None,
-             progress: Progress = None, **choices: Any) -> Landings:
+             changes: Changes = None, frame: int | str | None = None, threads: int = 0, folder: Path | None = None,
+             imports: Mapping[str, Any] | None = None, progress: Progress = None, **choices: Any) -> Landings:
     """Where the light of a scene lands on its plate: the map whose light `photon_distribution` draws.
 
-    scene, field, changes, frame, threads, folder, progress, choices    As those of `render`.
+    scene, field, changes, frame, threads, folder, imports, progress, choices    As those of `render`.
     s          Flexibilities: a number or several. None: those of the scene's light, evenly spaced between its ends.
     tolerance  Wanted error of landings between starts, pixels. Where the map bends or folds, starts are closer.
 
     Returns Landings.
     """
-    scene, field = imported(scene, field, choices, progress)
+    scene, field, frame = imported("landings", scene, field, frame, {**(imports or {}), **choices}, progress)
     request = request_of("landings", scene, field, changes=changes, frame=frame, folder=folder)
     flexibilities = [] if s is None else [float(value) for value in np.atleast_1d(s)]
     if not np.isfinite(flexibilities).all():

@@ -167,9 +167,6 @@ void check_spectral_output(const SceneDescription& scene, const SceneSource& sou
 }
 
 void check_scene(SceneDescription& scene, const Json& json, const SceneSource& source) {
-  // Eq. 7 makes −τ of −p I + τ, whose signs are those of pressure.
-  if (scene.field.derive == Derive::negative_viscous_stress && scene.field.eigenvalues == Eigenvalues::automatic)
-    scene.field.eigenvalues = Eigenvalues::raw;
   scene.default_lights = !given(json, "/lights");
   scene.default_objects = !given(json, "/objects");
   std::string& ocio = scene.output.ocio;
@@ -191,6 +188,12 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   warn_unused(scene, json, "/light/wavelengths", "/bending/rgb");
 }
 
+std::string Output::ending_of(const std::filesystem::path& file) const {
+  for (const std::string& ending : option_endings())
+    if (ends_with(file.string(), ending)) return ending;
+  return "";
+}
+
 const Method& IntegratorDescription::method() const {
   for (const auto& method : methods)
     if (method->name() == type.value) return *method;
@@ -200,7 +203,7 @@ const Method& IntegratorDescription::method() const {
 std::vector<NamedFile> input_files(const SceneDescription& scene) {
   std::vector<NamedFile> files;
   if (!is_device(scene.path)) files.push_back({scene.path, "the scene file"});  // A scene may come through a pipe.
-  files.push_back({scene.field.file, "`/field/file`"});
+  files.push_back({scene.field.file_to_read(), "`/field/file`"});
   if (const auto* bounds = std::get_if<std::filesystem::path>(&scene.field.bounds))
     files.push_back({*bounds, "`/field/bounds`"});
   const char* const environment = std::getenv("OCIO");  // It counts only where the scene names no config.

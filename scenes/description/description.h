@@ -84,6 +84,7 @@ enum class BoundsChoice { automatic, none };
 
 struct FieldDescription {
   std::filesystem::path file;                   ///< OpenVDB file with the field; empty if `generate` is given.
+  std::filesystem::path imported;               ///< The field that an import made of `file`; empty: `file` is one.
   std::string name;                             ///< Name of the field in the file; empty: the only field.
   std::optional<GenerateDescription> generate;  ///< Generated field, instead of a file.
   Derive derive = Derive::none;
@@ -95,6 +96,8 @@ struct FieldDescription {
   BorderChoice border = BorderChoice::automatic;
   std::optional<double> scale;                               ///< Factor on the flexibility; none: "auto".
   std::variant<BoundsChoice, std::filesystem::path> bounds;  ///< A file: a closed mesh that cuts the volume.
+
+  const std::filesystem::path& file_to_read() const { return imported.empty() ? file : imported; }
 };
 
 struct BendingDescription {

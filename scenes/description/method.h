@@ -35,6 +35,13 @@ struct Output {
   /// The ending that selects this kind with `-o FILE`, if other kinds have the same endings: ".spectral.exr".
   /// Null: `endings` select it.
   const char* option_ending = nullptr;
+
+  std::vector<std::string> option_endings() const {
+    return option_ending ? std::vector<std::string>{option_ending} : endings;
+  }
+
+  /// The ending of `file` by which `-o` selects this kind; empty: it does not.
+  std::string ending_of(const std::filesystem::path& file) const;
 };
 
 /// The key that says how strongly a picture shows the field, and the value that counts.

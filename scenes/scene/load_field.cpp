@@ -24,7 +24,7 @@ BlockSource open_field(const SceneDescription& scene) {
   if (!field.generate && has_number_sign(field.file.filename().string()) && !std::filesystem::exists(field.file))
     throw SceneError(field.file.string() + ": # is for the number of a frame: give --frames");
   if (!field.generate) {
-    BlockSource blocks = open_tensor_vdb(field.file, field.name, field.derive, field.components);
+    BlockSource blocks = open_tensor_vdb(field.file_to_read(), field.name, field.derive, field.components);
     return scene.world.up == UpAxis::z ? blocks : turned(std::move(blocks), scene.turn());
   }
   try {
@@ -128,6 +128,7 @@ LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const
   const double kept = before > 0 ? variation(grid) / before : 1;
   MadeField made = make_field(source_of(std::move(grid)), choices.eigenvalues, choices.interpolant);
   made.non_finite += non_finite;
+  if (choices.noise) made.resolution = {};  // Noise is never resolved.
   LoadedField loaded = with_notes(std::move(made), source);
   if (choices.noise) loaded.notes.push_back("field: its noise alone, in random order, and no structure");
   if (choices.smoothing > 0)
@@ -147,7 +148,7 @@ std::string field_key(const SceneDescription& description) {
   const FieldChoices choices = choices_of(description);
   return nlohmann::json{field,
                         description.world.up,
-                        identity_of(description.field.file),
+                        identity_of(description.field.file_to_read()),
                         choices.interpolant.between,
                         choices.interpolant.border,
                         choices.keeps_surface,

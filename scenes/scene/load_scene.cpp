@@ -160,11 +160,7 @@ void note_place(const Plate& plate, const TensorField& field, std::vector<std::s
                   description.path.string(), pointer, max_size));
 }
 
-double max_distance(const TensorField& field) {
-  Eigen::AlignedBox3d volume;
-  for (const Eigen::Vector3d& corner : field.corners()) volume.extend(corner);
-  return max_size * volume.diagonal().norm();
-}
+double max_distance(const TensorField& field) { return max_size * field.world_box().diagonal().norm(); }
 
 void require_near(const Beam& beam, const SceneDescription& description, const TensorField& field) {
   for (const Eigen::Vector2d& corner : beam.aperture)
@@ -227,11 +223,13 @@ AutoScale scale_for(const SceneDescription& description, const TensorField& fiel
 }
 
 /// The scale of the scene; without one, a scale that bends light visibly. The choice ignores obstacles and aperture, so
-/// that pictures with and without them can be compared. @param flexibility  Of light in the middle of the spectrum.
+/// that pictures with and without them can be compared. @param flexibility  Of light in the middle of the spectrum, or
+/// of the colour that bends most.
 AutoScale load_scale(const SceneDescription& description, const TensorField& field, const Geometry& geometry,
                      const Beam& beam, double flexibility, const Progress& progress, std::vector<std::string>& notes) {
   const std::optional<double>& given = description.field.scale;
-  if (!description.integrator.method().bends_light() || (given && !description.judges_scale))
+  if (!description.integrator.method().bends_light() ||
+      (given && (!description.judges_scale || description.field.noise || flexibility == 0)))
     return AutoScale{given.value_or(1)};
   const Geometry volume({geometry.surfaces().bounds, geometry.surfaces().cut, std::nullopt, {}});
   const Beam light = silhouette_beam(field.corners(), beam.direction, beam.up);
@@ -331,7 +329,8 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
   scene.channels = channels_of(light.bands, description.bending);
   scene.spectrum = std::move(light.spectrum);
   scene.bands = std::move(light.bands);
-  const double flexibility = scene.channels[scene.channels.size() / 2].flexibility;
+  double flexibility = scene.channels[scene.channels.size() / 2].flexibility;
+  if (description.bending.rgb) flexibility = description.bending.rgb->cwiseAbs().maxCoeff();
   scene.scale = load_scale(description, scene.field, scene.geometry, scene.beam, flexibility, progress, notes);
   scene.bending = description.bending.settings;
   scene.bending.scale = scene.scale.scale;

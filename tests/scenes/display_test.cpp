@@ -190,6 +190,15 @@ TEST(Annotations, AreAListOfNames) {
   EXPECT_THAT(described(Json::array()).output.annotations, IsEmpty());
   EXPECT_THAT(described({"legend", "scale"}).output.annotations, ElementsAre(Annotation::legend, Annotation::scale));
   EXPECT_THAT(described("axes").output.annotations, ElementsAre(Annotation::axes));
+  const auto of_paths = [](const Json& color) {
+    return read_scene_json(
+               {{"field", {{"file", "a.vdb"}}}, {"integrator", {{"type", "path_tracing"}, {"color", color}}}},
+               "scene.json")
+        .output.annotations;
+  };
+  EXPECT_THAT(of_paths({{"legend", false}}), ElementsAre(Annotation::scale));
+  for (const Json& color : {Json::object(), Json{{"legend", true}}})
+    EXPECT_THAT(of_paths(color), ElementsAre(Annotation::scale, Annotation::legend));
   for (const Json& wrong : {Json("bar"), Json({"axes", "bar"}), Json({"axes", "axes"}), Json(true), Json({1, 2})}) {
     EXPECT_THAT(message([&] { described(wrong); }),
                 HasSubstr(R"(`/output/annotations` must be a list of "scale", "axes", "legend", "body", "hidden")"));

@@ -2,55 +2,52 @@
 /// @file tools/command_line/imported_field.h
 /// Takes other programs' files without a separate import.
 
+#include <cstddef>
 #include <filesystem>
-#include <map>
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "base/files/output_file.h"
 #include "base/files/temporary_folder.h"
-
-namespace CLI {
-class App;
-}
+#include "tools/command_line/import_options.h"
 
 namespace tensorray {
 
-/// Options of `tensorray import` that other commands have, too, and their values; empty: not given.
-using ImportChoices = std::map<std::string, std::string>;
-
-/// Adds these options to a command. `choices` must outlive it.
-void add_import_options(CLI::App& command, ImportChoices& choices);
-
-/// These, and options that change the scene's field.
-void add_field_options(CLI::App& command, ImportChoices& choices, std::vector<std::string>& overrides);
-
-/// The options as they were given, each after a blank.
-std::string flags_of(const ImportChoices& choices);
-
-/// Whether a path names a file that is neither a scene nor an OpenVDB file.
-bool needs_import(const std::filesystem::path& path);
-
-/// A field made of another program's files, for as long as this object lives.
-class ImportedField {
+/// What a command line names: a scene, a field, or files of which an import makes a field, for as long as this lives.
+class GivenField {
  public:
-  /// Runs `tensorray-import` and prints its notes, unless `quiet` is set.
-  /// @throw std::runtime_error with the import's error; Cancelled.
-  ImportedField(const std::vector<std::filesystem::path>& files, const ImportChoices& choices, bool quiet);
+  /// Runs nothing yet, so that the rest of the command line can be checked first.
+  /// @throw std::invalid_argument if a file that needs no import comes with others, or with choices.
+  GivenField(std::vector<std::filesystem::path> files, ImportChoices choices);
 
-  const std::filesystem::path& path() const { return path_; }
+  /// The first file, by which messages name the field.
+  const std::filesystem::path& name() const { return files_.front(); }
+
+  bool is_imported() const { return folder_.has_value(); }
+
+  /// The field that `import` makes; empty: no import is needed.
+  const std::filesystem::path& imported() const { return imported_; }
+
+  /// The file to read.
+  const std::filesystem::path& path() const { return is_imported() ? imported_ : name(); }
+
+  /// The files that are read, and the mask, for require_distinct_files.
+  std::vector<NamedFile> inputs() const;
+
+  /// Runs `tensorray-import`, if that is needed, and prints its notes, unless `quiet` is set.
+  /// @param memory  What it works with, bytes; 0: without a bound.
+  /// @throw std::runtime_error with the import's error; Cancelled.
+  void import(bool quiet, std::size_t memory = 0) const;
+
+  /// For a scene that is to be saved. @throw std::invalid_argument with the fix if the field will not stay.
+  void require_stays() const;
 
  private:
-  TemporaryFolder folder_;
-  std::filesystem::path path_;
+  std::vector<std::filesystem::path> files_;
+  ImportChoices choices_;
+  std::optional<TemporaryFolder> folder_;
+  std::filesystem::path imported_;
 };
-
-/// For a file that needs no import. @throw std::invalid_argument if it comes with others, or with choices.
-void refuse_import(const std::vector<std::filesystem::path>& files, const ImportChoices& choices);
-
-/// Nothing if the first file needs no import. @throw as both of these.
-std::optional<ImportedField> import_field(const std::vector<std::filesystem::path>& files, const ImportChoices& choices,
-                                          bool quiet);
 
 /// Replaces this program by `tensorray-import`, which runs `tensorray import`, because only `tensorray-import`
 /// contains VTK.

@@ -2,7 +2,6 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -20,6 +19,7 @@
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/files/voxel_images.h"
+#include "volumes/tensors/eigenvalues.h"
 #include "volumes/tensors/invariants.h"
 
 namespace tensorray {
@@ -28,7 +28,7 @@ namespace {
 struct DeriveOptions {
   std::vector<std::filesystem::path> files;
   ImportChoices import;
-  std::filesystem::path input, output;  ///< The input: the file, or the field made of the files.
+  std::filesystem::path output;
   std::string field;
   std::vector<std::string> invariants;
 };
@@ -46,7 +46,7 @@ std::vector<Invariant> chosen_invariants(const DeriveOptions& options) {
 /// Metadata that is the same for all grids.
 std::map<std::string, std::string> file_metadata(const TensorGrid& field) {
   std::map<std::string, std::string> metadata = field.metadata;
-  metadata.erase("tensorray:units");
+  for (const std::string& key : {std::string("tensorray:units"), negated_key}) metadata.erase(key);
   return metadata;
 }
 
@@ -70,16 +70,16 @@ Eigen::Vector3i imported_size(const TensorGrid& field) {
   return size;
 }
 
-void derive(DeriveOptions options, const Progress& progress) {
+void derive(const DeriveOptions& options, const Progress& progress) {
   const Threads threads;
-  const std::optional<ImportedField> imported = import_field(options.files, options.import, false);
-  const std::filesystem::path& given = options.files.front();
-  options.input = imported ? imported->path() : given;
+  const GivenField given_field(options.files, options.import);
+  const std::filesystem::path& given = given_field.name();
   const std::vector<Invariant> invariants = chosen_invariants(options);
-  require_distinct_files({{given, "the field"}}, {{options.output, "-o"}});
+  require_distinct_files(given_field.inputs(), {{options.output, "-o"}});
+  given_field.import(false);
   OutputFile file(options.output);
   progress.update("reading", 0, 1);
-  TensorGrid field = read_tensor_vdb(options.input, options.field);
+  TensorGrid field = read_tensor_vdb(given_field.path(), options.field);
   const std::size_t removed = remove_non_finite(field);
   if (field.blocks.empty()) throw std::runtime_error(given.string() + ": no voxel of the field is finite");
   field.metadata.emplace("tensorray:field", field.name);

@@ -39,7 +39,7 @@ constexpr std::size_t columns = 6;  // Directions of the light.
 
 struct ExploreOptions {
   std::vector<std::filesystem::path> files;
-  std::filesystem::path scene;  // The file, or the field made of the files.
+  std::filesystem::path imported;  // The field that is made of the files, if they have to be imported.
   ImportChoices import;
   std::vector<std::string> overrides;
   std::string sheet, scene_copy;
@@ -110,7 +110,8 @@ std::vector<std::string> common_changes(const ExploreOptions& options) {
 SceneDescription with(const ExploreOptions& options, const std::vector<std::string>& more) {
   SceneChanges changes{common_changes(options), {}};
   changes.overrides.insert(changes.overrides.end(), more.begin(), more.end());
-  return read_scene(options.scene, changes);
+  changes.imported = options.imported;
+  return read_scene(options.files.front(), changes);
 }
 
 /// Pixels of a picture that fits into a cell.
@@ -182,7 +183,7 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
   }
 }
 
-void check(const ExploreOptions& options, const SceneDescription& description) {
+void check(const ExploreOptions& options, std::vector<NamedFile> inputs) {
   const std::vector<std::string> endings = image_endings();
   if (!options.sheet.empty() &&
       (ends_with(options.sheet, ".exr") || std::none_of(endings.begin(), endings.end(), [&](const std::string& ending) {
@@ -196,18 +197,20 @@ void check(const ExploreOptions& options, const SceneDescription& description) {
   if (!options.scene_copy.empty() && !is_field_file(options.files.front()))
     throw std::invalid_argument(
         "--save-scene: only for a field (.vdb), which stays; of a scene, change a copy by hand");
-  require_distinct_files(input_files(description), {{options.sheet, "-o"}, {options.scene_copy, "--save-scene"}});
+  for (const NamedFile& file : input_files(with(options, {}))) inputs.push_back(file);
+  require_distinct_files(inputs, {{options.sheet, "-o"}, {options.scene_copy, "--save-scene"}});
 }
 
 void explore(ExploreOptions options, Progress& progress) {
   const Threads threads(options.threads);
   set_image_threads(static_cast<int>(running_threads()));
-  const std::optional<ImportedField> imported = import_field(options.files, options.import, options.quiet);
-  options.scene = imported ? imported->path() : options.files.front();
-  check(options, with(options, {}));
+  const GivenField given(options.files, options.import);
+  options.imported = given.imported();
+  check(options, given.inputs());
   std::vector<OutputFile> files;
   for (const std::string& file : {options.sheet, options.scene_copy})
     if (!file.empty()) files.emplace_back(file);
+  given.import(options.quiet);
 
   std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);
   Sheet sheet(options.size);

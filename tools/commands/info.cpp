@@ -234,9 +234,10 @@ void print_text(const InfoOptions& options, const std::vector<GridInfo>& grids, 
 
 void info(InfoOptions options) {
   const Threads threads;
-  const std::optional<ImportedField> imported = import_field(options.files, options.import, options.json);
-  options.field_file = imported ? imported->path() : options.files.front();
-  if (!imported) {
+  const GivenField given(options.files, options.import);
+  given.import(options.json);
+  options.field_file = given.path();
+  if (!given.is_imported()) {
     std::signal(SIGINT, SIG_DFL);  // This command writes no file, so Ctrl-C may end it at once.
     std::signal(SIGTERM, SIG_DFL);
   }

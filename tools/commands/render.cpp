@@ -16,6 +16,7 @@
 #include "tools/commands/commands.h"
 #include "tools/ranks/ranks.h"
 #include "tools/rendering/render_scene.h"
+#include "volumes/files/tensor_files.h"
 
 namespace tensorray {
 namespace {
@@ -37,11 +38,8 @@ std::string output_help() {
       "Write this instead of the scene's outputs; one of each kind may be given. The ending says the kind";
   for (const auto& method : default_scene().integrator.methods) {
     text += fmt::format("; {}:", method->name());
-    for (const Output& kind : method->outputs()) {
-      const std::vector<std::string> endings =
-          kind.option_ending ? std::vector<std::string>{kind.option_ending} : kind.endings;
-      text += fmt::format(" {} ({})", joined(endings, " "), kind.key);
-    }
+    for (const Output& kind : method->outputs())
+      text += fmt::format(" {} ({})", joined(kind.option_endings(), " "), kind.key);
   }
   return text;
 }
@@ -79,67 +77,88 @@ void report_failed(const std::vector<int>& failed) {
                                        fmt::join(failed, ",")));
 }
 
-/// PICTURE.noise.png of PICTURE.png.
-std::filesystem::path noise_file(const std::filesystem::path& file) {
-  const std::string name = file.string();
-  std::string ending = file.extension().string();
-  for (const char* longer : {".nii.gz", ".spectral.exr"})
-    if (ends_with(name, longer)) ending = longer;
-  return name.substr(0, name.size() - ending.size()) + ".noise" + ending;
+/// What renders the noise of the field alone, to NAME.noise.png of NAME.png.
+SceneChanges noise_changes(SceneChanges changes, const SceneDescription& scene) {
+  changes.overrides.emplace_back("field.noise=true");
+  changes.outputs.clear();
+  for (const Output& kind : scene.integrator.method().outputs())
+    if (scene.output.files.count(kind.key) > 0) {
+      std::string file = scene.output.files.at(kind.key).string();
+      changes.outputs.emplace_back(file.insert(file.size() - kind.ending_of(file).size(), ".noise"));
+    }
+  return changes;
 }
 
-/// Renders a scene, and beside its pictures those of the field's noise alone, in the same light, if `split` is set.
-void render_and_split(const std::filesystem::path& scene, SceneChanges changes, RenderRun run, bool split,
+/// The noise of several levels is not known. @throw std::invalid_argument.
+void require_one_level(const FieldDescription& field, const GivenField& given) {
+  if (!field.generate &&
+      !open_tensor_vdb(field.file_to_read(), field.name, field.derive, field.components).finer.empty())
+    throw std::invalid_argument(printable(given.name().string()) +
+                                ": --split: the field has several levels; import it with --levels 1");
+}
+
+/// Renders a scene, and beside its pictures those of the field's noise alone, in the same light, if --split is given.
+/// What can be wrong with either is found before the work begins.
+void render_and_split(const GivenField& given, const SceneChanges& changes, const RenderRun& run, bool split,
                       Progress& progress) {
   if (split && (changes.outputs.empty() || run.keeping.shard || run.ranks))
     throw std::invalid_argument("--split: name the pictures with -o; it is not for shards, frames and ranks");
-  const std::vector<std::string> chosen = render_scene(scene, changes, run, progress);
+  const auto description = [&](const SceneChanges& each) { return read_scene(given.name(), each); };
+  SceneChanges noise;
+  RenderRun of_noise = run;
+  if (split || given.is_imported()) open_files(description(changes), run);
+  if (split) {
+    noise = noise_changes(changes, description(changes));
+    for (const std::filesystem::path& file : files_of(description(changes), run))
+      of_noise.inputs.push_back({file, "a picture of the field"});
+    of_noise.statistics = of_noise.scene_copy = of_noise.keeping.light = "";
+    of_noise.keeping.resume = false;
+    open_files(description(noise), of_noise);
+  }
+  given.import(run.quiet, run.memory);
+  if (split) require_one_level(description(changes).field, given);
+  const std::vector<std::string> chosen = render_scene(given.name(), changes, run, progress);
   if (!split) return;
-  changes.overrides.insert(changes.overrides.end(), chosen.begin(), chosen.end());
-  changes.overrides.emplace_back("field.noise=true");
-  for (std::filesystem::path& output : changes.outputs) output = noise_file(output);
-  run.statistics = run.scene_copy = "";
-  render_scene(scene, changes, run, progress);
+  noise.overrides.insert(noise.overrides.end(), chosen.begin(), chosen.end());
+  render_scene(given.name(), noise, of_noise, progress);
+}
+
+/// The name of pictures, without its ending: beside a file, without its known ending; of a folder, its own name.
+std::string picture_name(std::filesystem::path file) {
+  if (std::filesystem::is_directory(file)) {
+    if (!file.has_filename()) file = file.parent_path();  // "case/"
+    const bool is_dots = file.filename() == "." || file.filename() == "..";
+    return (is_dots ? std::filesystem::weakly_canonical(file).filename() : file).string();
+  }
+  if (lower_case_ending(file) == ".gz") file.replace_extension();
+  return file.replace_extension().string();
 }
 
 /// Renders other programs' files. Its pictures are named after the first.
-void render_import(SceneChanges changes, const RenderOptions& options, Progress& progress) {
-  const std::filesystem::path& file = options.files.front();
+void render_import(const GivenField& given, SceneChanges changes, const RenderOptions& options, Progress& progress) {
   if (!options.frames.empty()) throw std::invalid_argument("--frames: import the files first, with `tensorray import`");
   if (!options.shard.empty() || options.run.keeping.resume)
     throw std::invalid_argument("--shard, --resume: import the file first, with `tensorray import`");
-  if (!options.run.scene_copy.empty())
-    throw std::invalid_argument("--save-scene: a scene needs a field that stays; make it with `tensorray import " +
-                                printable(file.string()) + flags_of(options.import) + " -o FIELD.vdb`");
-  if (changes.outputs.empty()) {
-    std::filesystem::path name = file.has_filename() ? file : file.parent_path();
-    while (name.has_extension()) name.replace_extension();  // .nii.gz
-    changes.outputs = {name.string() + ".png", name.string() + ".exr"};
-  }
-  std::vector<NamedFile> outputs{{options.run.statistics, "--stats"}};
-  for (const std::filesystem::path& output : changes.outputs) outputs.push_back({output, "-o"});
-  std::vector<NamedFile> inputs;
-  for (const std::filesystem::path& input : options.files) inputs.push_back({input, "the input"});
-  require_distinct_files(inputs, outputs);
-  ImportChoices choices = options.import;
-  if (options.run.memory > 0) choices["--memory"] = std::to_string(options.run.memory);
-  const ImportedField field(options.files, choices, options.run.quiet);
+  if (!options.run.scene_copy.empty()) given.require_stays();
+  const std::string name = picture_name(given.name());
+  if (changes.outputs.empty()) changes.outputs = {name + ".png", name + ".exr"};
+  changes.imported = given.imported();
   RenderRun run = options.run;
+  run.inputs = given.inputs();
   run.keeping.is_on = false;  // The field does not stay.
-  render_and_split(field.path(), changes, run, options.split, progress);
+  render_and_split(given, changes, run, options.split, progress);
 }
 
 /// @param ranks  Null: this process is alone. @return frames that failed, where the run keeps going.
 std::vector<int> render(const RenderOptions& options, Ranks* ranks, Progress& progress) {
   if (!is_root(ranks)) broadcast(ranks, true);  // The root has found nothing wrong with the command line.
   SceneChanges changes = changes_of(options);
-  const std::filesystem::path& scene = options.files.front();
-  if (needs_import(scene)) {
+  const GivenField given(options.files, options.import);
+  if (given.is_imported()) {
     if (ranks) throw std::invalid_argument("mpirun: import the file first, with `tensorray import`");
-    render_import(changes, options, progress);
+    render_import(given, changes, options, progress);
     return {};
   }
-  refuse_import(options.files, options.import);
   RenderRun run = options.run;
   run.ranks = ranks;
   if (!options.shard.empty()) take_shard(options.shard, changes, run.keeping);
@@ -147,11 +166,11 @@ std::vector<int> render(const RenderOptions& options, Ranks* ranks, Progress& pr
     throw std::invalid_argument("--save-scene: not for several frames");
   if (is_root(ranks)) broadcast(ranks, true);
   if (options.frames.empty()) {
-    render_and_split(scene, changes, run, options.split, progress);
+    render_and_split(given, changes, run, options.split, progress);
     return {};
   }
   if (options.split) throw std::invalid_argument("--split: not for several frames");
-  return render_frames(scene, changes, parse_frames(options.frames), run, progress);
+  return render_frames(given.name(), changes, parse_frames(options.frames), run, progress);
 }
 
 /// The root says what is wrong for all; other ranks, what is wrong with them alone.

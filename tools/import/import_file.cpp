@@ -33,6 +33,7 @@
 #include "tools/import/surfaces/triangle_shells.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/vtk_source.h"
+#include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
 namespace {
@@ -427,6 +428,7 @@ TensorGrid import_tensors(const ImportSettings& given, const Progress& progress,
     const auto negated = [](const Eigen::Matrix3f& value) -> Eigen::Matrix3f { return -value; };
     change_tensors(grid.blocks, negated);
     for (TensorBlocks& level : grid.finer) change_tensors(level, negated);
+    grid.metadata[negated_key] = "yes";
   }
   grid.name = tensor_name(grid.name, settings.take);
   grid.metadata["tensorray:source"] = file.filename().string();

@@ -59,22 +59,23 @@ std::string run_statistics(const Scene& scene, const Statistics& statistics, dou
   return json.dump(2) + "\n";
 }
 
-/// The scene's text, with what was chosen for it, so that it looks the same with a field that has changed.
-std::string scene_as_rendered(const Scene& scene) {
-  auto json = parse_value(scene.description.text);
-  json["field"]["scale"] = scene.scale.scale;
-  const Eigen::Vector3d V = scene.description.turn().transpose() * *scene.description.light.direction;
-  if (json.contains("light") && json["light"].value("direction", Json()) == "auto")
-    json["light"]["direction"] = {V.x(), V.y(), V.z()};
-  return json.dump(2) + "\n";
-}
-
+/// Changes that fix what was chosen: the direction of the light, if the scene leaves it open, and the strength.
 std::vector<std::string> choices_for(const Scene& scene) {
+  const Json light = parse_value(scene.description.text).value("light", Json::object());
   const Eigen::Vector3d V = scene.description.turn().transpose() * *scene.description.light.direction;
-  std::vector<std::string> changes{fmt::format("light.direction=[{},{},{}]", V.x(), V.y(), V.z())};
+  std::vector<std::string> changes;
+  if (light.value("direction", Json()) == "auto")
+    changes.push_back(fmt::format("light.direction=[{},{},{}]", V.x(), V.y(), V.z()));
   const Strength strength = scene.method->strength(scene);
   if (!strength.is_fixed) changes.push_back(fmt::format("{}.{}={}", strength.section, strength.key, strength.value));
   return changes;
+}
+
+/// The scene's text, with what was chosen for it, so that it looks the same with a field that has changed.
+std::string scene_as_rendered(const Scene& scene) {
+  Json json = parse_value(scene.description.text);
+  for (const std::string& choice : choices_for(scene)) apply_override(json, choice);
+  return json.dump(2) + "\n";
 }
 
 /// Renders what is left of the job. @throw Interrupted if it is cancelled, but some of its work is kept: with the
@@ -166,17 +167,6 @@ void continue_or_begin(const Scene& scene, RunFiles files, const RenderRun& run,
   complete(scene, job, std::move(files), run, progress);
 }
 
-/// Paths in a scene are relative to its folder. @throw SceneError if the copy is in another one.
-void check_scene_copy(const std::filesystem::path& scene, const std::filesystem::path& copy) {
-  if (copy.empty() || is_field_file(scene)) return;  // The scene of a field has no relative paths.
-  const auto folder = [](const std::filesystem::path& file) {
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(file).parent_path());
-  };
-  if (folder(scene) != folder(copy))
-    throw SceneError(printable(fmt::format("{} {}: must be in the folder of {}, to which paths in it are relative",
-                                           scene_key, copy.string(), scene.string())));
-}
-
 }  // namespace
 
 void bound_memory_of(const RenderRun& run, const SceneDescription& description) {
@@ -215,7 +205,7 @@ std::vector<std::string> render_scene(const std::filesystem::path& scene_file, c
   const SceneDescription description = read_scene(scene_file, changes);
   refuse_number_signs(description, run);
   bound_memory_of(run, description);
-  if (is_field_file(scene_file)) tell({"scene: " + description.text}, run.quiet);
+  if (is_field_file(scene_file) || !changes.imported.empty()) tell({"scene: " + description.text}, run.quiet);
   return choices_for(render_to_files(description, run, {}, progress));
 }
 
@@ -235,12 +225,14 @@ void merge_shards(const SceneDescription& description, WorkFile shards, const Re
 }
 
 OutputFiles open_files(const SceneDescription& description, const RenderRun& run) {
-  check_scene_copy(description.path, run.scene_copy);
+  require_same_folder(description.path, run.scene_copy);
   const std::vector<NamedFile> more{
       {run.statistics, statistics_key}, {run.scene_copy, scene_key}, {run.keeping.shard_file, shard_key}};
   std::vector<NamedFile> all = more;
   all.push_back({checkpoint_of(description, run.keeping), "the checkpoint"});
-  check_files(description, all, {{run.keeping.light, "--light"}});
+  std::vector<NamedFile> read = run.inputs;
+  read.push_back({run.keeping.light, "--light"});
+  check_files(description, all, read);
   OutputFiles files;
   if (!run.keeping.shard) files = open_outputs(description.output);
   for (const NamedFile& file : more)

@@ -38,6 +38,7 @@ struct RenderRun {
   bool skip_existing = false;        ///< Leave out frames of which all files exist, but no checkpoint.
   bool keep_going = false;           ///< Of a sequence: a frame that fails does not end it.
   bool quiet = false;                ///< Print only errors.
+  std::vector<NamedFile> inputs;     ///< Files that are read beside those of the scene, and must not be replaced.
   std::filesystem::path statistics;  ///< JSON file for the statistics; empty: none.
   std::filesystem::path scene_copy;  ///< File for the scene with its changes; empty: none.
 };

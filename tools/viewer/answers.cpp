@@ -181,8 +181,7 @@ Json describe_field(const Scene& scene) {
 
 Json describe_choices(const Scene& scene, const Render& render) {
   const Plate& plate = *scene.geometry.surfaces().plate;
-  double far = -std::numeric_limits<double>::infinity();
-  for (const Vector3d& corner : scene.field.corners()) far = std::max(far, corner.dot(scene.beam.direction));
+  const double far = depth_range(scene.field, Vector3d::Zero(), scene.beam.direction).far;
   Json receiver = {{"normal", in_axes_of(scene, to_json(plate.normal()))}, {"size", {plate.size.x(), plate.size.y()}}};
   if (!scene.description.receiver.center) receiver["distance"] = plate.center.dot(scene.beam.direction) - far;
   const Strength strength = scene.method->strength(scene);

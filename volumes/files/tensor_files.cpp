@@ -17,6 +17,7 @@
 #include "volumes/files/grid_voxels.h"
 #include "volumes/files/surface_grids.h"
 #include "volumes/grids/mirror.h"
+#include "volumes/tensors/eigenvalues.h"
 #include "volumes/tensors/finite_differences.h"
 
 namespace tensorray {
@@ -185,6 +186,7 @@ BlockSource stress_of(BlockSource source, float sign) {
   };
   source.fill = stress(source.fill);
   for (BlockLevel& level : source.finer) level.fill = stress(level.fill);
+  if (sign < 0 && source.metadata.erase(negated_key) == 0) source.metadata[negated_key] = "yes";
   return source;
 }
 

@@ -185,6 +185,7 @@ Resolution measure_resolution(const TensorField& field, const std::vector<BlockS
 }  // namespace
 
 MadeField make_field(const BlockSource& source, Eigenvalues mode, const Interpolant& interpolant) {
+  if (mode == Eigenvalues::automatic && source.metadata.count(negated_key) > 0) mode = Eigenvalues::raw;
   Eigenvalues chosen = mode == Eigenvalues::automatic ? guess(source) : mode;
   MadeField result;
   BlockSource current = source;

@@ -4,6 +4,7 @@
 
 #include <complex>
 #include <cstddef>
+#include <string>
 
 #include <Eigen/Core>
 
@@ -11,8 +12,12 @@
 
 namespace tensorray {
 
+/// An entry of a grid's metadata: its tensors have changed their signs, which count therefore.
+inline const std::string negated_key = "tensorray:negated";
+
 enum class Eigenvalues {
-  automatic,  ///< `absolute` where the field is symmetric (symmetric_tolerance), `raw` where it is not.
+  automatic,  ///< `absolute` where the field is symmetric (symmetric_tolerance) and not negated (negated_key), else
+              ///< `raw`.
   raw,        ///< T as it is.
   absolute,   ///< E |Λ| E⁻¹. A complex pair r e^{±iφ} becomes r: its rotation is erased, and so is simple shear.
   positive,   ///< (T²)^½: flips the sign where the real part is negative, and keeps rotation.

@@ -108,6 +108,7 @@ ScalarGrid invariant_grid(Invariant which, const TensorGrid& grid) {
   result.name = invariant_names()[static_cast<std::size_t>(which)];
   result.to_world = grid.to_world;
   result.metadata = grid.metadata;
+  result.metadata.erase(negated_key);
   const auto units = result.metadata.find("tensorray:units");
   if (units != result.metadata.end()) units->second = units_of_power(units->second, invariant_degree(which));
   result.blocks.resize(grid.blocks.size());

@@ -160,6 +160,32 @@ TEST_F(FieldAlone, FilesThatHaveToBeImportedAreRenderedAsTheyAreAfterAnImport) {
   run_well(with_small({"render", "tensors.vdb", "-o", "after.exr", "-q"}));
   EXPECT_EQ(read_image(in_folder("tensors.exr")).pixels, read_image(in_folder("after.exr")).pixels);
   EXPECT_TRUE(exists(in_folder("tensors.png")));
+  EXPECT_NE(outcome.error.find("tensors.nrrd, 125 voxels"), std::string::npos) << outcome.error;
+  EXPECT_EQ(outcome.error.find("field.vdb"), std::string::npos) << outcome.error;
+  EXPECT_NE(outcome.error.find("eigenvalues absolute"), std::string::npos) << outcome.error;
+  std::filesystem::copy_file(in_folder("tensors.nrrd"), in_folder("run.1.nrrd"));
+  const Outcome negated = run_well(with_small({"render", "run.1.nrrd", "--negate"}));
+  EXPECT_NE(negated.error.find("eigenvalues raw"), std::string::npos) << negated.error;
+  EXPECT_TRUE(exists(in_folder("run.1.png")));
+
+  write("mask.nii", "a mask");
+  write("case.foam", "");
+  const std::pair<const char*, std::vector<std::string>> early[] = {
+      // Before the import.
+      {"--mask", {"render", "tensors.nrrd", "--mask", "mask.nii", "-o", "mask.nii"}},
+      {"--mask", {"derive", "tensors.nrrd", "--mask", "mask.nii", "--invariant", "trace", "-o", "mask.nii"}},
+      {"the input", {"derive", "tensors.nrrd", "mask.nii", "--invariant", "trace", "-o", "mask.nii"}},
+      {"the input", {"render", "tensors.nrrd", "mask.nii", "-o", "mask.nii"}},
+      {"the input", {"render", "tensors.nrrd", "m.noise.nii", "-o", "m.nii", "--split"}},
+      {"no invariant", {"derive", "noise.vti", "--invariant", "bogus", "-o", "a.vdb"}},
+      {"belong together", {"explore", "noise.vti", "--pick", "3", "-o", "a.png"}},
+      {"tensors.nrrd mask.nii -o", {"render", "tensors.nrrd", "mask.nii", "--save-scene", "a.json"}}};
+  write("noise.vti", "noise");
+  write("m.noise.nii", "another");
+  for (const auto& [text, arguments] : early) expect_error(text, arguments);
+  EXPECT_EQ(read_file(in_folder("mask.nii")), "a mask");
+  expect_error("case.foam", {"render", "case.foam", "--gradient-of", "U"});
+  expect_error("three edges", {"render", "tensors.nrrd", "--voxel-size", "1", "1", "2"});
 
   expect_error("tensorray import", {"render", "tensors.nrrd", "--save-scene", "scene.json"});
   expect_error("--stats", {"render", "tensors.nrrd", "--stats", "tensors.nrrd"});
@@ -168,8 +194,24 @@ TEST_F(FieldAlone, FilesThatHaveToBeImportedAreRenderedAsTheyAreAfterAnImport) {
   expect_error("`tensorray import tensors.nrrd --array 'stress' -o FIELD.vdb`",
                {"render", "tensors.nrrd", "--array", "stress", "--save-scene", "scene.json"});
   expect_error("missing.nii.gz does not exist", {"render", "missing.nii.gz", "--order", "fsl"});
-  write("noise.vti", "noise");
   expect_error("noise.vti", {"render", "noise.vti"});
+}
+
+TEST_F(FieldAlone, IsSplitFromItsNoiseInTheSameLight) {
+  const Outcome outcome =
+      run_well(with_small({"render", "stress.vdb", "--split", "-o", "s.exr", "-o", "s.spectral.exr"}));
+  for (const char* file : {"s.exr", "s.spectral.exr", "s.noise.exr", "s.noise.spectral.exr"})
+    EXPECT_TRUE(exists(in_folder(file))) << file;
+  const std::string of_noise = outcome.error.substr(outcome.error.find("its noise alone"));
+  EXPECT_EQ(of_noise.find("warning"), std::string::npos) << of_noise;
+}
+
+TEST_F(FieldAlone, OfAPolariscopeTheCoefficientIsSaved) {
+  run_well({"render", "stress.vdb", "-q", "--method", "polariscope", "--set", "camera.resolution=[24,24]", "--set",
+            "receiver.resolution=[24,24]", "-o", "p.png", "--save-scene", "p.json"});
+  const json scene = read_json("p.json");
+  EXPECT_TRUE(scene["integrator"]["stress_optic"].is_number()) << scene.dump();
+  EXPECT_FALSE(scene["field"].contains("scale")) << scene.dump();
 }
 
 }  // namespace

@@ -57,6 +57,8 @@ TEST_F(Errors, ScenesAndCommandLines) {
       {"one kind", {"render", "scene.json", "-o", "a.png", "-o", "b.jpg"}},
       {"--stats.*scene.json", {"render", "scene.json", "--stats", "scene.json"}},
       {"--stats.*a.png", {"render", "scene.json", "-o", "a.png", "--stats", "a.png"}},
+      {"one image plane",
+       {"render", "scene.json", "--method", "lens", "-o", "a.nii", "--set", "integrator.image_plane.depth=[0.2,0.5]"}},
       {"", {"make", "cheese", "-o", "a.vdb"}},
       {"resolution", {"make", "vortex", "-o", "a.vdb", "--resolution", "0"}},
       {"", {"make", "vortex"}}};
@@ -141,6 +143,10 @@ TEST_F(Errors, OddLightIsWarnedOf) {
   expect_warning("warning: light turns too little to be seen: `field.scale` .* shows", "field.scale=1e-6");
   expect_warning("warning: light is tangled: `field.scale` .* shows", "field.scale=3e4");
   expect_warning("negative: light bends the other way", "field.scale=-1");
+  for (const char* set : {"bending={\"a\":0,\"b\":0}", "bending.rgb=[0.1,0,0.3]"})
+    EXPECT_EQ(run_well({"render", "scene.json", "--set", "field.scale=1e-6", "--set", set}).error.find("inf"),
+              std::string::npos)
+        << set;
   expect_warning("warning: the plate lies before the volume", "receiver={\"center\":[0,0,9],\"size\":[1,1]}");
   expect_warning("warning: the plate lies in the volume", "receiver={\"center\":[0,0,-0.5],\"size\":[1,1]}");
   expect_warning("warning: no probe ray is turned",

@@ -198,5 +198,15 @@ TEST(Smoothing, NoiseOfLevelsIsRefused) {
   EXPECT_THROW(keep_noise(grid), std::invalid_argument);
 }
 
+TEST(FieldMaking, SignsOfANegatedFieldCount) {
+  TensorGrid grid = dense_grid({Vector3i::Zero(), Vector3i::Constant(7)}, Eigen::Affine3d::Identity(), symmetric);
+  for (const auto& [mode, chosen] :
+       {std::pair(Eigenvalues::automatic, Eigenvalues::absolute), std::pair(Eigenvalues::automatic, Eigenvalues::raw),
+        std::pair(Eigenvalues::absolute, Eigenvalues::absolute)}) {
+    EXPECT_EQ(make_field(view_of(grid), mode).eigenvalues.chosen, chosen);
+    grid.metadata[negated_key] = "yes";
+  }
+}
+
 }  // namespace
 }  // namespace tensorray

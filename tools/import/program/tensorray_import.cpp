@@ -26,6 +26,7 @@
 #include "base/process/progress.h"
 #include "base/text/path_text.h"
 #include "base/text/text.h"
+#include "tools/command_line/import_options.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
@@ -51,11 +52,10 @@ constexpr double max_negative = 0.2;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, viscous_stress_of, order, frame, cells = "linear", error, rounding;
-  std::vector<int> resolution;
-  std::vector<double> voxel_size, bounds, origin;
+  ImportChoices choices;
+  std::string rounding;
   std::filesystem::path output, boundary;
-  std::string name, units, mirror, steps = "last", called;
+  std::string name, units, called;
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
   bool no_surface = false, half = false, quiet = false, silent = false, tells_progress = false;
 };
@@ -68,34 +68,58 @@ std::optional<Value> named(const std::string& name, const std::vector<std::pair<
   return {};
 }
 
+/// The value of an option; empty: it is not given.
+std::string text_of(const ImportChoices& choices, const std::string& flag) {
+  const auto found = choices.find(flag);
+  return found == choices.end() ? "" : found->second.front();
+}
+
+/// Its numbers, which CLI11 has checked. @throw std::invalid_argument if there are two of one or three.
+std::vector<double> numbers_of(const ImportChoices& choices, const std::string& flag) {
+  std::vector<double> numbers;
+  if (const auto found = choices.find(flag); found != choices.end())
+    for (const std::string& text : found->second) CLI::detail::lexical_cast(text, numbers.emplace_back());
+  if (numbers.size() == 2) throw std::invalid_argument(flag + " needs one number, or three: x y z");
+  return numbers;
+}
+
 ImportSettings settings_of(const ImportOptions& options) {
   ImportSettings settings = options.settings;
-  settings.array = options.array + options.gradient_of + options.strain_of + options.viscous_stress_of;  // One.
-  if (!options.gradient_of.empty()) settings.take = Take::gradient;
-  if (!options.strain_of.empty()) settings.take = Take::strain;
-  if (!options.viscous_stress_of.empty()) settings.take = Take::viscous_stress;
-  settings.order = named(options.order, tensor_orders());
-  settings.frame = named(options.frame, component_frames());
+  const ImportChoices& choices = options.choices;
+  SamplingSettings& sampling = settings.sampling;
+  const std::vector<double> resolution = numbers_of(choices, "--resolution"),
+                            voxel_size = numbers_of(choices, "--voxel-size"), origin = numbers_of(choices, "--origin"),
+                            bounds = numbers_of(choices, "--bounds");
+  settings.array = text_of(choices, "--array");
+  for (const Take take : {Take::gradient, Take::strain, Take::viscous_stress}) {
+    if (choices.count(flag_of(take)) == 0) continue;
+    settings.array = text_of(choices, flag_of(take));
+    settings.take = take;
+  }
+  settings.negate = choices.count("--negate") > 0;
+  settings.order = named(text_of(choices, "--order"), tensor_orders());
+  settings.frame = named(text_of(choices, "--frame"), component_frames());
+  settings.mask = text_of(choices, "--mask");
   settings.surface = !options.no_surface;
-  if (options.cells == "constant") settings.cell_values = CellValues::constant;
-  if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
-  if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
-  if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
-  if (!options.error.empty()) settings.sampling.error = part_of(options.error, "--error");
-  if (!options.rounding.empty()) settings.sampling.rounding = part_of(options.rounding, "--rounding");
-  if (options.voxel_size.size() == 1 && settings.sampling.finest > options.voxel_size[0])
+  if (text_of(choices, "--cells") == "constant") settings.cell_values = CellValues::constant;
+  if (voxel_size.size() == 1) sampling.resolution = voxel_size[0];
+  if (voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(voxel_size.data());
+  for (const double levels : numbers_of(choices, "--levels")) sampling.levels = static_cast<int>(levels);
+  for (const double finest : numbers_of(choices, "--finest")) sampling.finest = finest;
+  for (const double thickness : numbers_of(choices, "--thickness")) settings.thickness = thickness;
+  if (choices.count("--error") > 0) sampling.error = part_of(text_of(choices, "--error"), "--error");
+  if (!options.rounding.empty()) sampling.rounding = part_of(options.rounding, "--rounding");
+  if (sampling.finest && voxel_size.size() == 1 && *sampling.finest > voxel_size[0])
     throw std::invalid_argument("--finest must not be larger than --voxel-size, which is the coarsest");
-  if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
-  if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
-  if (options.resolution.size() == 2) throw std::invalid_argument("--resolution needs one number, or three: x y z");
-  if (!options.origin.empty()) settings.origin = Eigen::Vector3d(options.origin.data());
+  if (resolution.size() == 1) sampling.resolution = static_cast<int>(resolution[0]);
+  if (resolution.size() == 3) sampling.resolution = Eigen::Vector3i(Eigen::Vector3d(resolution.data()).cast<int>());
+  if (!origin.empty()) settings.origin = Eigen::Vector3d(origin.data());
   if (settings.origin && !settings.origin->allFinite()) throw std::invalid_argument("--origin needs finite numbers");
-  if (!options.bounds.empty()) {
-    const Eigen::Vector3d min(options.bounds[0], options.bounds[2], options.bounds[4]);
-    const Eigen::Vector3d max(options.bounds[1], options.bounds[3], options.bounds[5]);
+  if (!bounds.empty()) {
+    const Eigen::Vector3d min(bounds[0], bounds[2], bounds[4]), max(bounds[1], bounds[3], bounds[5]);
     if (!(min.array() <= max.array()).all())
       throw std::invalid_argument("--bounds needs xmin xmax ymin ymax zmin zmax, each min below its max");
-    settings.sampling.bounds = Eigen::AlignedBox3d(min, max);
+    sampling.bounds = Eigen::AlignedBox3d(min, max);
   }
   return settings;
 }
@@ -181,10 +205,10 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
   if (!options.name.empty()) grid.name = options.name;
   grid.metadata["tensorray:field"] = grid.name;
   if (!options.units.empty()) grid.metadata["tensorray:units"] = options.units;
-  if (!options.mirror.empty()) {
-    grid.metadata[mirror_key] = options.mirror;
+  if (const std::string mirror = text_of(options.choices, "--mirror"); !mirror.empty()) {
+    grid.metadata[mirror_key] = mirror;
     with_mirror_image(view_of(grid));  // Does it fit?
-    report.notes.push_back(fmt::format("half of a field: readers add its mirror image in {} = 0", options.mirror));
+    report.notes.push_back(fmt::format("half of a field: readers add its mirror image in {} = 0", mirror));
   }
   progress.update("writing", 0, 1);
   const std::string name = grid.name;
@@ -227,9 +251,9 @@ void require_replaceable(const std::filesystem::path& output) {
                                 "choose another name");
 }
 
-void check_files(const ImportOptions& options, const std::vector<std::filesystem::path>& read) {
-  std::vector<NamedFile> inputs{{options.settings.mask, "--mask"}};
-  for (const std::filesystem::path& file : read) inputs.push_back({file, "the file to import"});
+void check_files(const ImportOptions& options, const ImportSettings& settings) {
+  std::vector<NamedFile> inputs{{settings.mask, "--mask"}};
+  for (const std::filesystem::path& file : settings.files) inputs.push_back({file, "the file to import"});
   require_distinct_files(inputs, {{options.output, "-o"}, {options.boundary, "--boundary"}});
   require_replaceable(options.output);
 }
@@ -240,7 +264,7 @@ std::string crash_message(const ImportSettings& settings) {
 }
 
 void import_step(const ImportOptions& options, ImportSettings settings, Progress& progress) {
-  check_files(options, settings.files);
+  check_files(options, settings);
   std::vector<OutputFile> files;
   files.emplace_back(options.output);
   if (!options.boundary.empty()) {
@@ -285,12 +309,13 @@ void import(const ImportOptions& options, Progress& progress) {
     if (is_device(file))
       throw std::runtime_error(file.string() + " is a pipe or a device; write what it gives to a file");
   }
-  if (options.steps == "all") return import_all_steps(options, settings, progress);
+  const std::string steps = text_of(options.choices, "--steps");
+  if (steps == "all") return import_all_steps(options, settings, progress);
+  const bool is_last = steps.empty() || steps == "last";
   int step = 1;
-  if (options.steps != "last" && options.steps != "first" &&
-      (!CLI::detail::lexical_cast(options.steps, step) || step < 1))
-    throw std::invalid_argument("--steps " + escaped(options.steps) + ": give all, first, last, or a number from 1 on");
-  if (options.steps != "last") settings.step = step - 1;
+  if (!is_last && steps != "first" && (!CLI::detail::lexical_cast(steps, step) || step < 1))
+    throw std::invalid_argument("--steps " + escaped(steps) + ": give all, first, last, or a number from 1 on");
+  if (!is_last) settings.step = step - 1;
   import_step(options, settings, progress);
 }
 
@@ -298,113 +323,18 @@ std::string check_ply_output(const std::string& text) {
   return std::filesystem::path(text).extension() == ".ply" ? "" : text + " must end in .ply";
 }
 
-std::string positive(const std::string& text) {
-  double value = 0;
-  const bool is_number = CLI::detail::lexical_cast(text, value);
-  return is_number && std::isfinite(value) && value > 0 ? "" : text + " is no size: give a number greater than 0";
-}
-
-void add_what(CLI::App& command, ImportOptions& options) {
-  command.option_defaults()->group("What to take");
-  auto* array =
-      command.add_option("--array", options.array,
-                         "The array that is the tensor (default: the only one), or its components: six or nine scalar "
-                         "arrays (sxx,syy,szz,sxy,syz,sxz), components of others (NAME:COMPONENT), or three vectors "
-                         "as rows");
-  auto* gradient =
-      command.add_option("--gradient-of", options.gradient_of,
-                         "Take the gradient of this vector array, or of three scalar arrays (u,v,w): T_ij = dv_i/dx_j, "
-                         "made on the mesh itself");
-  auto* strain = command.add_option("--strain-of", options.strain_of,
-                                    "Take the symmetric part of the gradient of this displacement");
-  auto* stress = command.add_option("--viscous-stress-of", options.viscous_stress_of,
-                                    "Take the viscous stress of this velocity, T + T' - 2/3 tr T I of its gradient T");
-  array->excludes(gradient, strain, stress);
-  gradient->excludes(strain, stress);
-  strain->excludes(stress);
-  command.add_flag("--negate", options.settings.negate, "Change the sign of the tensors, for example to pressure > 0");
-  command
-      .add_option(
-          "--order", options.order,
-          "Order of six components: vtk (xx yy zz xy yz xz), fsl (xx xy xz yy yz zz), mrtrix (xx yy zz xy xz "
-          "yz), voigt (xx yy zz yz xz xy), lower (xx xy yy xz yz zz); of four: plane (xx yy zz xy), 2x2 (xx xy yx yy)")
-      ->check(CLI::IsMember(tensor_orders()))
-      ->option_text("ORDER");
-  command
-      .add_option("--frame", options.frame,
-                  "Axes of the components in anatomical files (NIfTI, NRRD, MetaImage, MRtrix): ras (scanner; MRtrix), "
-                  "lps (displacements of "
-                  "ITK and ANTs), voxels (tensors of ANTs and dipy), fsl (voxels, with FSL's flip); default: those of "
-                  "--order fsl and lower, else ras (MetaImage: lps; NRRD: its space)")
-      ->check(CLI::IsMember(component_frames()))
-      ->option_text("FRAME");
-  command
-      .add_option("--cells", options.cells,
-                  "What tensors at the cells of a mesh are in between: linear (averaged to the points, and "
-                  "interpolated), or constant in each cell (linear)")
-      ->check(CLI::IsMember({"linear", "constant"}))
-      ->option_text("VALUES");
-}
-
-void add_where(CLI::App& command, ImportOptions& options) {
-  command.option_defaults()->group("Grid");
-  auto* resolution = command
-                         .add_option("--resolution", options.resolution,
-                                     "Voxels along the longest edge, or along x, y and z (default: the median cell "
-                                     "is a voxel; data on voxels keep theirs)")
-                         ->expected(1, 3)
-                         ->check(CLI::Range(1, 8192));
-  command
-      .add_option("--voxel-size", options.voxel_size,
-                  "Edge of a voxel; of .npy, the distance of its voxels, or three: x y z (default: 1)")
-      ->expected(1, 3)
-      ->check(positive)
-      ->excludes(resolution);
-  command
-      .add_option("--origin", options.origin, "World x y z of the centre of the first voxel of .npy (default: 0 0 0)")
-      ->expected(3);
-  command
-      .add_option("--thickness", options.settings.thickness,
-                  "Thickness of the slab that a flat mesh becomes (default: a typical edge of its cells)")
-      ->check(positive);
-  command
-      .add_option("--levels", options.settings.sampling.levels,
-                  "At most so many sizes of voxels, of which each is half of the one before, as fine as the cells of "
-                  "the mesh ask (default: 4)")
-      ->check(CLI::Range(1, max_levels));
-  command
-      .add_option("--finest", options.settings.sampling.finest,
-                  "The least edge of a voxel (default: what the levels reach); without --voxel-size, which is the "
-                  "coarsest, the levels are counted from it")
-      ->check(positive)
-      ->excludes(resolution);
-  command
-      .add_option("--error", options.error,
-                  "Refine where voxels differ from the mesh by more than this part of its peak, as 1%; 0: wherever "
-                  "cells are smaller than voxels")
-      ->option_text("PART");
-  command
-      .add_option("--rounding", options.rounding,
+/// Adds the options to `program`. The import runs when they are parsed. Errors are exceptions: CLI::Error and
+/// std::invalid_argument where the user's input is wrong.
+void add_options(CLI::App& program, Progress& progress) {
+  const auto options = std::make_shared<ImportOptions>();
+  add_import_options(program, options->choices);
+  program.get_option("--order")->check(CLI::IsMember(tensor_orders()));
+  program.get_option("--frame")->check(CLI::IsMember(component_frames()));
+  program
+      .add_option("--rounding", options->rounding,
                   "Round components to this part of the median norm at most, as 1%, and twice that at each level, and "
                   "compress the file more: with --half it is a third as large")
       ->option_text("PART");
-  command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6);
-  command
-      .add_option("--mirror", options.mirror,
-                  "What is imported is half of a symmetric field: readers of the file add its mirror image in the plane "
-                  "x = 0, y = 0 or z = 0 of the file")
-      ->check(CLI::IsMember({"x", "y", "z"}))
-      ->option_text("AXIS");
-}
-
-/// Adds the options to `program`. The import runs when they are parsed. Errors are exceptions: CLI::Error and
-/// std::invalid_argument where the user's input is wrong.
-void add_import_options(CLI::App& program, Progress& progress) {
-  const std::string usual_group = program.option_defaults()->get_group();
-  const auto options = std::make_shared<ImportOptions>();
-  add_what(program, *options);
-  add_where(program, *options);
-  program.option_defaults()->group(usual_group);
   program
       .add_option("FILE", options->settings.files,
                   "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .vth .pvd .vtkhdf), XDMF (.xdmf .xmf), "
@@ -421,22 +351,12 @@ void add_import_options(CLI::App& program, Progress& progress) {
       ->check(check_vdb_output)
       ->option_text("FILE");
   program
-      .add_option("--mask", options->settings.mask,
-                  "Of files of voxels: a file with one number in each voxel; where it is 0, there is no tensor")
-      ->option_text("FILE");
-  program
       .add_option("--boundary", options->boundary,
                   "Write the surface of the body that the mesh lies around, for `obstacles`: FILE.ply")
       ->check(check_ply_output)
       ->option_text("FILE");
   program.add_flag("--no-surface", options->no_surface,
                    "Leave out the surface of the body that a mesh is, within which light bends");
-  program
-      .add_option(
-          "--steps", options->steps,
-          "Steps of time, of files that have some: last, first, a number from 1 on, or all, each in a file of its own "
-          "(-o flow.####.vdb) (last)")
-      ->option_text("STEPS");
   program
       .add_option("--memory", options->memory,
                   "Keep voxels in files on the disk of the output, of which the system has in memory what is free, "
@@ -478,6 +398,6 @@ int main(int argc, char** argv) {
   if (first == "--read-vtp") return tensorray::read_vtp(argc, argv);
   tensorray::Progress& progress = tensorray::progress_until_interrupted();
   CLI::App app("Make a tensor field of another program's file", "tensorray import");
-  tensorray::add_import_options(app, progress);
+  tensorray::add_options(app, progress);
   return tensorray::run_and_report([&] { tensorray::parse(app, argc, argv); });
 }

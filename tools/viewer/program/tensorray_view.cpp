@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "base/process/child_program.h"
+#include "integrators/methods/read_scene.h"
 #include "renderer/images/image.h"
 #include "tools/command_line/imported_field.h"
 #include "tools/command_line/run_and_report.h"
@@ -48,23 +49,15 @@ std::filesystem::path page_folder() {
 /// NAME.view.json, beside the scene.
 std::filesystem::path default_copy(std::filesystem::path scene) { return scene.replace_extension(".view.json"); }
 
-/// Paths in a scene are relative to its folder, and stay so in its copy.
-void require_same_folder(const ViewedScene& viewed) {
-  const auto folder = [](const std::filesystem::path& file) {
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(file).parent_path());
-  };
-  if (viewed.file.extension() != ".vdb" && folder(viewed.file) != folder(viewed.copy))
-    throw std::invalid_argument("--save-scene " + viewed.copy.string() + ": must be in the folder of " +
-                                viewed.file.string() + ", to which paths in it are relative");
-}
-
 /// The command line that renders what is viewed, from any folder.
 std::vector<std::string> command_of(const ViewOptions& options) {
   std::vector<std::string> words{sibling_program("tensorray").string(), "render"};
   for (const std::filesystem::path& file : options.files) words.push_back(std::filesystem::absolute(file).string());
-  for (const auto& [flag, value] : options.import)
-    if (!value.empty())
-      words.insert(words.end(), {flag, flag == "--mask" ? std::filesystem::absolute(value).string() : value});
+  for (const auto& [flag, values] : options.import) {
+    words.push_back(flag);
+    for (const std::string& value : values)
+      words.push_back(flag == "--mask" ? std::filesystem::absolute(value).string() : value);
+  }
   for (const std::string& change : options.viewed.overrides) words.insert(words.end(), {"--set", change});
   return words;
 }
@@ -85,13 +78,12 @@ Server listen(const ViewOptions& options, Pages& pages) {
 void view(ViewOptions options, Progress& progress) {
   const Threads threads(options.threads);
   set_image_threads(static_cast<int>(running_threads()));
-  const std::optional<ImportedField> imported = import_field(options.files, options.import, options.quiet);
-  options.viewed.file = imported ? imported->path() : options.files.front();
-  if (imported && !options.viewed.copy.empty())
-    throw std::invalid_argument("--save-scene: a scene needs a field that stays; make it with `tensorray import " +
-                                options.files.front().string() + flags_of(options.import) + " -o FIELD.vdb`");
-  if (!imported && options.viewed.copy.empty()) options.viewed.copy = default_copy(options.viewed.file);
-  if (!imported) require_same_folder(options.viewed);
+  const GivenField given(options.files, options.import);
+  if (!options.viewed.copy.empty()) given.require_stays();
+  options.viewed.file = given.path();
+  if (!given.is_imported() && options.viewed.copy.empty()) options.viewed.copy = default_copy(options.viewed.file);
+  require_same_folder(options.viewed.file, options.viewed.copy);
+  given.import(options.quiet);
   options.viewed.command = command_of(options);
   options.server.token = token_of_user();
   options.server.page = page_folder();
