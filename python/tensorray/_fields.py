@@ -139,9 +139,7 @@ def read_vdb(file: Path, name: str = "", *,
     derive  "gradient" of a vector grid, "hessian" of a scalar grid, "viscous_stress" of a velocity or its gradient (or
             with "-"), or "none": the grids are the tensor's components.
     """
-    keys = {"file": os.path.abspath(os.fspath(file))}  # The field stays that of this file in other folders.
-    if name:
-        keys["name"] = name
+    keys = {"file": os.path.abspath(os.fspath(file)), **({"name": name} if name else {})}  # In other folders, too.
     if derive != "none":
         keys["derive"] = derive
     with shown(progress) as report:
@@ -163,14 +161,13 @@ def make(kind: str, resolution: int | Sequence[int] | None = None, *, min: Array
 
 
 def import_file(*files: Path, array: str | None = None, gradient_of: str | None = None, strain_of: str | None = None,
-                viscous_stress_of: str | None = None, negate: bool = False,
-                cells: str | None = None, order: str | None = None, frame: str | None = None,
-                resolution: int | Sequence[int] | None = None, voxel_size: float | Sequence[float] | None = None,
-                levels: int | None = None, finest: float | None = None, error: float | str | None = None,
-                origin: Sequence[float] | None = None, bounds: Sequence[float] | None = None,
-                mask: Path | None = None, thickness: float | None = None, step: int | str | None = None,
-                boundary: Path | None = None, name: str | None = None, units: str | None = None,
-                progress: Progress = None) -> Field:
+                viscous_stress_of: str | None = None, negate: bool = False, cells: str | None = None,
+                order: str | None = None, frame: str | None = None, resolution: int | Sequence[int] | None = None,
+                voxel_size: float | Sequence[float] | None = None, levels: int | None = None,
+                finest: float | None = None, error: float | str | None = None, origin: Sequence[float] | None = None,
+                bounds: Sequence[float] | None = None, mask: Path | None = None, thickness: float | None = None,
+                step: int | str | None = None, boundary: Path | None = None, name: str | None = None,
+                units: str | None = None, progress: Progress = None) -> Field:
     """Makes a field of other programs' files: VTK, XDMF, EnSight, ExodusII, CGNS, OpenFOAM, PLOT3D, NRRD, NIfTI,
     MetaImage, MRtrix, NumPy.
 
@@ -206,11 +203,10 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
     if not os.path.exists(program):
         raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
     options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of,
-               "--viscous-stress-of": viscous_stress_of, "--cells": cells,
-               "--order": order, "--frame": frame, "--resolution": resolution, "--voxel-size": voxel_size,
-               "--levels": levels, "--finest": finest, "--error": error, "--origin": origin, "--bounds": bounds,
-               "--mask": mask, "--thickness": thickness, "--steps": step, "--boundary": boundary, "--name": name,
-               "--units": units}
+               "--viscous-stress-of": viscous_stress_of, "--cells": cells, "--order": order, "--frame": frame,
+               "--resolution": resolution, "--voxel-size": voxel_size, "--levels": levels, "--finest": finest,
+               "--error": error, "--origin": origin, "--bounds": bounds, "--mask": mask, "--thickness": thickness,
+               "--steps": step, "--boundary": boundary, "--name": name, "--units": units}
     with tempfile.TemporaryDirectory() as folder:
         vdb = os.path.join(folder, "field.vdb")
         command = [program, "--tell-progress", "-q", "-o", vdb, *["--negate"] * negate]
@@ -230,21 +226,19 @@ def import_file(*files: Path, array: str | None = None, gradient_of: str | None 
 
 
 def imported(function, scene, field, frame, choices, progress, outputs=()):
-    """The scene, the field and the frame to take, where the scene may be a file, or a list of files, for import_file.
-    A `frame` that is a word is that of the import. `outputs` must not be files that are read."""
+    """The scene, the field and the frame to take, where the scene may be a file, or a list of files, for import_file. A
+    `frame` that is a word is that of the import."""
     if isinstance(frame, str):
         choices, frame = {**choices, "frame": frame}, None
-    for name in choices:
-        if name not in inspect.signature(import_file).parameters or name in ("files", "progress"):
-            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}")
+    for name in choices.keys() - inspect.signature(import_file).parameters.keys():
+        raise TypeError(f"{function}() got an unexpected keyword argument {name!r}")
     files = scene if isinstance(scene, (list, tuple)) else [scene]
     if isinstance(scene, (list, tuple)) or isinstance(scene, (str, os.PathLike)) and needs_import(scene):
         if field is not None:
             raise ValueError("field: the scene is a file that is imported as one; give one of them")
-        read = [file for file in [*files, choices.get("mask")] if file is not None and os.path.exists(file)]
-        for output in outputs:
-            if os.path.exists(output) and any(os.path.samefile(output, file) for file in read):
-                raise ValueError(f"outputs: {os.fspath(output)} is a file that is read; choose another")
+        read = [file for file in (*files, choices.get("mask")) if file is not None and os.path.exists(file)]
+        if any(os.path.exists(output) and os.path.samefile(output, file) for output in outputs for file in read):
+            raise ValueError("outputs: one of them is a file that is read; choose another")
         return None, import_file(*files, **choices, progress=progress), frame
     if choices:
         raise ValueError(f"imports: only files that have to be imported have these choices: {', '.join(choices)}")
@@ -254,12 +248,10 @@ def imported(function, scene, field, frame, choices, progress, outputs=()):
 def needs_import(file):
     """Whether a file is neither a scene, which begins with "{" or a comment, nor an OpenVDB file."""
     name = os.fspath(file)
-    if os.path.isdir(name):  # A case of OpenFOAM.
+    if os.path.isdir(name) or name.lower().endswith(".foam") or os.path.basename(name) == "controlDict":  # OpenFOAM's.
         return True
     if name.endswith(".vdb") or name.lower().endswith(".json") or not os.path.isfile(name):
         return False
-    if name.lower().endswith(".foam") or os.path.basename(name) == "controlDict":  # They begin with comments.
-        return True
     with open(name, "rb") as stream:
         return stream.read(4096).lstrip()[:1] not in (b"{", b"/")
 

@@ -289,7 +289,7 @@ TEST_F(Grids, DeriveTellsWhatThereIs) {
   EXPECT_NE(run_well({"derive", "--help"}).out.find("fractional_anisotropy"), std::string::npos);
   run_well({"make", "vortex", "-o", "t.vdb", "--resolution", "9"});
   expect_error("fractional_anisotropy", {"derive", "t.vdb", "--invariant", "curl", "-o", "i.vdb"}, 2);
-  expect_error("-o (t.vdb) is the same file as the field", {"derive", "t.vdb", "--invariant", "norm", "-o", "t.vdb"},
+  expect_error("-o (t.vdb) is the same file as the input", {"derive", "t.vdb", "--invariant", "norm", "-o", "t.vdb"},
                2);
   expect_error(".vdb", {"derive", "t.vdb", "--invariant", "norm", "-o", "i.png"}, 2);
   expect_error("--invariant", {"derive", "t.vdb", "-o", "i.vdb"}, 2);
