@@ -29,6 +29,7 @@
 #include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/flat_mesh.h"
 #include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/sampling/sampling_lattice.h"
 #include "tools/import/surfaces/mesh_boundary.h"
 #include "tools/import/surfaces/triangle_shells.h"
 #include "tools/import/vtk_formats/image_lattice.h"
@@ -207,6 +208,19 @@ double thickness_of(vtkDataSet& mesh, const BodyFaces& faces) {
   return surface.area > 0 && surface.open_edges == 0 ? 2 * surface.mesh.volume() / surface.area : 0;
 }
 
+/// The edges of the finest voxels along the axes do not tell how many are across a body that is turned.
+void warn_of_thickness(const SamplingSettings& settings, const SamplingReport& sampled, ImportReport& report) {
+  constexpr double least = 2.5;  // Voxels across.
+  const double voxel = sampled.finer.empty() ? sampled.voxel.minCoeff() : sampled.finer.back().voxel;
+  const Eigen::Vector3d edges = sampled.voxel.cwiseProduct((sampled.size - Eigen::Vector3i::Ones()).cast<double>());
+  if (settings.flat_axis < 0 && is_thin(settings, {Eigen::Vector3d::Zero(), edges}) &&
+      settings.thickness < least * voxel)
+    report.warnings.push_back(
+        fmt::format("the body is about {:.3g} thick, and its finest voxels are {:.3g}: the field in it is coarse; try "
+                    "--voxel-size {:.2g}",
+                    settings.thickness, voxel, settings.thickness / across_thickness));
+}
+
 TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportSettings& settings,
                        const Progress& progress, ImportReport& report) {
   if (!settings.mask.empty())
@@ -233,9 +247,10 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
   SamplingSettings sampling = settings.sampling;
   const bool has_surface = settings.surface && !vtkImageData::SafeDownCast(&data);
   const BodyFaces faces = has_surface ? body_faces(*mesh) : BodyFaces();
-  if (has_surface && !wants_sampling(settings)) sampling.thickness = thickness_of(*mesh, faces);
+  if (has_surface) sampling.thickness = thickness_of(*mesh, faces);
   TensorGrid grid = sample_mesh(*mesh, sampling, progress, *report.mesh);
   grid.name = array.name;
+  warn_of_thickness(sampling, *report.mesh, report);
   if (has_surface) add_surface(*mesh, faces, settings, progress, grid, report);
   return grid;
 }

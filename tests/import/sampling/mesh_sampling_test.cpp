@@ -163,6 +163,22 @@ TEST(MeshSampling, ThinBodiesGetVoxelsAcrossThem) {
   }
 }
 
+// A turned plate that is too large for such voxels in all of its box: finer levels have them, whatever the linear field
+// needs.
+TEST(MeshSampling, LargeThinBodiesGetThemByLevels) {
+  const auto turn = Eigen::AngleAxisd(0.4, Vector3d(1, 2, 0).normalized());
+  const auto mesh =
+      curvilinear({41, 31, 2}, [&](const Vector3d& p) { return turn * Vector3d(60 * p.x(), 45 * p.y(), 0.5 * p.z()); });
+  add_linear_tensor(*mesh);
+  SamplingSettings settings;
+  settings.thickness = 0.49;
+  SamplingReport report;
+  const TensorGrid grid = sampled(*mesh, settings, report);
+  EXPECT_GT(report.voxel.maxCoeff(), 0.2);
+  ASSERT_FALSE(report.finer.empty());
+  EXPECT_LE(report.finer.back().voxel, settings.thickness / 4 * 1.03);
+}
+
 TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {
   // 200 thin slices beside a long cell: for the median cell, 10^7 voxels would be needed.
   const auto mesh = curvilinear(

@@ -130,6 +130,7 @@ void remove_orphans(const TensorBlocks& before, TensorBlocks& blocks) {
 /// did not set are no more than a few times those of level 0 at most.
 void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settings, const Progress& progress,
                       TensorGrid& grid, SamplingReport& report) {
+  constexpr double rounded_size = 1.02;
   constexpr double fitted = 0.7;  // Voxels that fit in the box are a little smaller than they were meant.
   constexpr double bricks_of_all = 1 << 18, bricks_of_chosen = 1 << 11;
   constexpr int largest = 1 << 28;  // Of a lattice along an axis.
@@ -137,7 +138,12 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
   const bool is_chosen = settings.resolution.index() == 0 && !settings.finest;
   const double error = is_adaptive(coarsest.solid) && !settings.error ? 0 : settings.error.value_or(default_error);
   report.wanted_error = error;
-  const std::vector<float> sizes = cell_sizes(coarsest);
+  std::vector<float> sizes = cell_sizes(coarsest);
+  double across = 0;  // Of a thin body, voxels of this size are needed everywhere, whatever they miss.
+  if (is_chosen && is_thin(settings, sampled_box(coarsest.solid, settings))) {
+    across = settings.thickness / across_thickness;
+    for (float& size : sizes) size = std::min(size, static_cast<float>(0.5 * across));
+  }
   SamplingLattice lattice = coarsest.lattice;
   BlockPlaces places(lattice.size);
   std::size_t bricks = 0;
@@ -146,7 +152,8 @@ void add_finer_levels(const MeshSource& coarsest, const SamplingSettings& settin
       return;
     const MeshSource source = on_lattice(coarsest, lattice);
     const TensorBlocks& blocks = level == 1 ? grid.blocks : grid.finer.back();
-    const double tolerance = error > 0 ? error * report.native_peak * std::pow(2, level - 1) : -1;
+    const bool is_coarse = across > 0 && lattice.voxel.maxCoeff() > across * rounded_size;
+    const double tolerance = error > 0 && !is_coarse ? error * report.native_peak * std::pow(2, level - 1) : -1;
     const auto missed = missed_cells({source, places, blocks}, sizes, tolerance);
     const std::vector<bool> refined = bricks_to_refine(lattice, places, missed);
     const auto count = static_cast<std::size_t>(std::count(refined.begin(), refined.end(), true));

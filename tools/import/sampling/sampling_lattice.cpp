@@ -83,13 +83,6 @@ double edge_by_volume(const Solid& solid, const AlignedBox3d& bounds) {
   return 0;
 }
 
-constexpr double across_thickness = 4;  ///< Voxels across a thin body, wherever its faces are.
-
-/// Whether a body is a plate or a shell: much thinner than its box, whose faces are not its own.
-bool is_thin(const SamplingSettings& settings, const AlignedBox3d& box) {
-  return settings.thickness > 0 && settings.thickness < box.sizes().minCoeff() / 4;
-}
-
 /// The voxels of level 0: twice as large, and so on, while that is no larger than the large cells, and fits in the box.
 double doubled(double voxel, const Solid& solid, const AlignedBox3d& box, const SamplingSettings& settings) {
   double large = std::min(edge_by_volume(solid, box), box.sizes().maxCoeff());
@@ -108,9 +101,7 @@ double largest_cell(const Solid& solid, const AlignedBox3d& box) {
 
 double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& box, const SamplingSettings& settings) {
   double voxel = std::min(typical_edge(mesh, solid, box), box.sizes().maxCoeff());
-  if (const double thin = settings.thickness / across_thickness;
-      is_thin(settings, box) && thin < voxel && is_small(voxels_across(box.sizes(), thin)))
-    voxel = thin;
+  if (is_thin(settings, box)) voxel = std::min(voxel, settings.thickness / across_thickness);
   while (!is_small(voxels_across(box.sizes(), voxel))) voxel *= 1.01;
   return voxel;
 }
@@ -174,6 +165,10 @@ bool is_adaptive(const Solid& solid) {
     differ = differ || halvings > 0.5;
   }
   return differ;
+}
+
+bool is_thin(const SamplingSettings& settings, const AlignedBox3d& box) {
+  return settings.thickness > 0 && settings.thickness < box.sizes().minCoeff() / 4;
 }
 
 SamplingLattice finer(const SamplingLattice& lattice) {

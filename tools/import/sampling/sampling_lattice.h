@@ -41,6 +41,11 @@ SamplingLattice finer(const SamplingLattice& lattice);
 /// Whether cells have at least two sizes, which differ by powers of two: those of adaptive refinement.
 bool is_adaptive(const Solid& solid);
 
+constexpr double across_thickness = 4;  ///< Voxels across a thin body, wherever its faces are.
+
+/// Whether a body is a plate or a shell: much thinner than its box, whose faces are not its own.
+bool is_thin(const SamplingSettings& settings, const Eigen::AlignedBox3d& box);
+
 /// What is sampled: the bounds that the user gives, else those of the mesh; of a slab, its whole thickness.
 Eigen::AlignedBox3d sampled_box(const Solid& solid, const SamplingSettings& settings);
 
