@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -70,6 +71,14 @@ double greatest_integral(const Scene& scene, PolarizedLight light) {
   return greatest_of_most(integrals);
 }
 
+/// Metres in a unit of length; 1 if it is empty, or of another name.
+double metres_in(const std::string& unit) {
+  static const std::map<std::string, double> units{{"nm", 1e-9}, {"um", 1e-6}, {"mm", 1e-3},   {"cm", 1e-2},
+                                                   {"m", 1},     {"km", 1e3},  {"in", 0.0254}, {"ft", 0.3048}};
+  const auto found = units.find(unit);
+  return found == units.end() ? 1 : found->second;
+}
+
 /// A number as it is printed, so that a scene can have the same.
 double rounded(double value) {
   const std::string text = fmt::format("{:.6g}", value);
@@ -126,6 +135,8 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
   light.bands = bands_of(scene);
   light.reference = reference_channel(scene);
   light.samples = settings.samples.value_or(2);
+  const FieldUnits units = units_of(scene);
+  const double unit_length = settings.unit_length.value_or(metres_in(units.length));
   const double wavelength = loaded.wavelength = light.bands[light.reference].wavelength;
   if (scene.description.light.aperture) {
     light.aperture.emplace();
@@ -144,11 +155,16 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
   } else if (const auto* number = std::get_if<double>(&settings.stress_optic)) {
     loaded.stress_optic = *number;
   } else {
-    loaded.stress_optic = choose_coefficient(scene, light, settings.unit_length, wavelength, notes);
+    loaded.stress_optic = choose_coefficient(scene, light, unit_length, wavelength, notes);
   }
-  if (!std::isfinite(static_cast<float>(loaded.stress_optic * settings.unit_length * scene.field.max_norm())))
+  if (!std::isfinite(static_cast<float>(loaded.stress_optic * unit_length * scene.field.max_norm())))
     throw std::runtime_error("`/integrator/stress_optic` times the field is beyond single precision; check its units");
-  light.strength = pi * loaded.stress_optic * settings.unit_length / (wavelength * nanometre);
+  loaded.order_note = fmt::format("1 order: {:g} nm", wavelength);
+  if (!units.tensor.empty() && !units.length.empty())
+    loaded.order_note +=
+        fmt::format(", {:.3g} {} {}", wavelength * nanometre / std::abs(loaded.stress_optic * unit_length),
+                    units.tensor, units.length);
+  light.strength = pi * loaded.stress_optic * unit_length / (wavelength * nanometre);
   loaded.arrangement = turned(arrangement_of(settings.arrangement), settings.angle, settings.analyzer);
   return loaded;
 }

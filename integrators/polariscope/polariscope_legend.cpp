@@ -20,7 +20,7 @@ constexpr double cross_place = 0.1;    // ... and its distance from the upper ri
 /// Draws a line through a point, and a letter at its end. @param angle  From u towards w, degrees.
 void draw_mark(Image& image, const Vector2d& center, double radius, double angle, const std::string& letter) {
   const Vector2d along(std::cos(angle * pi / 180), -std::sin(angle * pi / 180));
-  const double height = std::max(7.0, 0.45 * radius), width = std::max(1.0, radius / 16);
+  const double height = letter_height(image.width, image.height), width = std::max(1.0, radius / 16);
   const Vector2d end = center + (radius + height) * along;
   const Vector2d lower_left = end + Vector2d(-text_width(letter, height) / 2, height / 2);
   const Eigen::AlignedBox2d ground(center - Vector2d::Constant(1.5 * radius),
@@ -71,7 +71,8 @@ std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const
   };
   return [range, color, arrangement = loaded.arrangement](Image& image, double exposure) {
     const double gain = std::exp2(exposure);
-    draw_color_bar(image, {"nm", range, [&](double position) -> Vector3d { return gain * color(position); }});
+    draw_color_bar(image,
+                   {"retardance\nnm", range, [&](double position) -> Vector3d { return gain * color(position); }});
     draw_cross(image, arrangement);
   };
 }

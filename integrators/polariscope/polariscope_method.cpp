@@ -165,6 +165,7 @@ Render LoadedPolariscope::render_of(const Scene& scene, const PolarPicture& pict
   if (scene.description.output.wants(Annotation::legend)) {
     const double shown = greatest_of_most(integrals);
     result.draw_legend = polariscope_legend(scene, loaded_, settings_, shown > 0 ? shown : loaded_.wavelength);
+    result.legend_note = loaded_.order_note;
   }
   result.describe_pixel = [wavelength = loaded_.wavelength](const float* pixel) {
     return std::vector<std::pair<std::string, std::string>>{
