@@ -123,7 +123,8 @@ std::vector<Eigen::Vector3d> cut_points(const TensorField& field, const Eigen::V
   return points;
 }
 
-ShadedSurface make_slice(const Scene& scene, const ShownLight& light, const SliceDescription& slice) {
+ShadedSurface make_slice(const Scene& scene, const ShownLight& light, const SliceDescription& slice,
+                         std::vector<SurfaceLegend>& legends) {
   const Eigen::Vector3d normal = slice.normal.normalized(), up = upright(normal, Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d right = up.cross(normal);
   const Eigen::AlignedBox3d& extent = scene.field.index_bounds();
@@ -152,6 +153,8 @@ ShadedSurface make_slice(const Scene& scene, const ShownLight& light, const Slic
   add_lattice(
       cells.x() + 1, cells.y() + 1, [&](std::uint32_t vertex) { return inside[vertex]; }, mesh);
   const ValueRange range = slice.range ? ValueRange{slice.range->x(), slice.range->y()} : choose_range(values);
+  legends.push_back(bar_legend(invariant_title(slice.invariant, units_of(scene)), range,
+                               [map = slice.map](double at) { return colormap_linear(map, at); }));
   ShadedSurface surface;
   for (const double value : values)
     surface.colors.push_back((light.rec709_to_working * colormap_linear(slice.map, range.position(value)))
@@ -224,7 +227,8 @@ Material load_material(const MaterialDescription& description, const ShownLight&
 }
 
 void add_context(const Scene& scene, const PathScene& paths, Job* job, const Progress& progress,
-                 std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials) {
+                 std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials,
+                 std::vector<SurfaceLegend>& legends) {
   const ContextDescription& context = paths.settings.context;
   const auto add_surface = [&](ShadedSurface surface, const MaterialDescription& material) {
     add(paths.lights.light, std::move(surface), material, surfaces, materials);
@@ -240,7 +244,7 @@ void add_context(const Scene& scene, const PathScene& paths, Job* job, const Pro
     add_surface(std::move(body), plain(0.6, 0.5));
   }
   if (context.plate) add_surface(lit_plate(scene, job, progress), plain(0.8, 1));
-  if (context.slice) add_surface(make_slice(scene, paths.lights.light, *context.slice), plain(0.8, 1));
+  if (context.slice) add_surface(make_slice(scene, paths.lights.light, *context.slice, legends), plain(0.8, 1));
   for (const IsosurfaceDescription& each : context.isosurfaces)
     add_surface(make_isosurface(scene, each), each.material);
 }

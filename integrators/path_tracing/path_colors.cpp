@@ -35,18 +35,19 @@ std::function<double(const PathPoint&)> value_of(const PathColorDescription& des
   }
 }
 
-std::string title_of(const PathColorDescription& description) {
+/// Words below each other, and the unit.
+std::string title_of(const PathColorDescription& description, const FieldUnits& units) {
   switch (description.by) {
     case PathColor::force:
-      return "|T V|";
+      return "|T V|\n" + units.tensor;
     case PathColor::transverse_force:
-      return "|T V| across";
+      return "|T V|\nacross\n" + units.tensor;
     case PathColor::curvature:
-      return "|V'|";
+      return units.length.empty() ? "|V'|" : "|V'|\n1/" + units.length;
     case PathColor::invariant:
-      return choice_name(description.invariant);
+      return invariant_title(description.invariant, units);
     default:
-      return choice_name(description.by);
+      return choice_name(description.by) + ("\n" + units.length);
   }
 }
 
@@ -141,11 +142,7 @@ PathColors wavelength_colors(const std::vector<Path>& paths, double radius) {
     range.high = &path == &paths.front() ? path.wavelength : std::max(range.high, path.wavelength);
   }
   if (range.high - range.low < 1) return colors;
-  colors.legend = [range](Image& image, const Eigen::Matrix3d& from_rec709) {
-    draw_color_bar(image, {"nm", range, [&](double position) -> Eigen::Vector3d {
-                             return from_rec709 * wavelength_color(range.value(position));
-                           }});
-  };
+  colors.legend = bar_legend("nm", range, [range](double at) { return wavelength_color(range.value(at)); });
   return colors;
 }
 
@@ -163,17 +160,31 @@ PathColors direction_colors(const std::vector<Path>& paths) {
   PathColors colors;
   colors.of_points =
       colors_of(paths, [](const PathPoint& point) -> Eigen::Vector3d { return point.direction.cwiseAbs(); });
-  colors.legend = [](Image& image, const Eigen::Matrix3d& from_rec709) {
-    ColorKey key = direction_key();
-    for (ColorKeyEntry& entry : key.entries) entry.color = from_rec709 * entry.color;
-    draw_color_key(image, key);
+  colors.legend = [](Image& image, const Eigen::Matrix3d& from_rec709, const LegendPlace& place) {
+    draw_color_key(image, {"", {{"x", from_rec709.col(0)}, {"y", from_rec709.col(1)}, {"z", from_rec709.col(2)}}},
+                   place);
   };
   return colors;
 }
 
 }  // namespace
 
-PathColors path_colors(const PathColorDescription& description, const std::vector<Path>& paths, double radius) {
+SurfaceLegend bar_legend(const std::string& title, const ValueRange& range,
+                         const std::function<Eigen::Vector3d(double)>& color) {
+  return [=](Image& image, const Eigen::Matrix3d& from_rec709, const LegendPlace& place) {
+    draw_color_bar(image, {title, range, [&](double at) -> Eigen::Vector3d { return from_rec709 * color(at); }}, place);
+  };
+}
+
+std::string invariant_title(Invariant which, const FieldUnits& units) {
+  std::string title = choice_name(which);
+  std::replace(title.begin(), title.end(), '_', '\n');
+  const int degree = invariant_degree(which);
+  return degree == 0 ? title : title + "\n" + units_of_power(units.tensor, degree);
+}
+
+PathColors path_colors(const PathColorDescription& description, const std::vector<Path>& paths, double radius,
+                       const FieldUnits& units) {
   if (description.by == PathColor::wavelength) return wavelength_colors(paths, radius);
   if (description.by == PathColor::direction) return direction_colors(paths);
   PathColors colors;
@@ -183,12 +194,8 @@ PathColors path_colors(const PathColorDescription& description, const std::vecto
   colors.of_points = colors_of(paths, [&](const PathPoint& point) -> Eigen::Vector3d {
     return colormap_linear(description.map, range.position(value(point)));
   });
-  colors.legend = [range, map = description.map, title = title_of(description)](Image& image,
-                                                                                const Eigen::Matrix3d& from_rec709) {
-    draw_color_bar(image, {title, range, [&](double position) -> Eigen::Vector3d {
-                             return from_rec709 * colormap_linear(map, position);
-                           }});
-  };
+  colors.legend = bar_legend(title_of(description, units), range,
+                             [map = description.map](double at) { return colormap_linear(map, at); });
   return colors;
 }
 

@@ -4,30 +4,43 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "integrators/path_tracing/path_tracing_method.h"
+#include "renderer/charts/color_bar.h"
 #include "renderer/charts/colormap.h"
 #include "renderer/images/image.h"
 #include "renderer/surfaces/surface.h"
 #include "renderer/surfaces/tube_mesh.h"
+#include "scenes/scene/scene.h"
 #include "tracing/paths/paths.h"
 
 namespace tensorray {
+
+/// Draws a legend of colours over a picture. `from_rec709`: to the picture's colours.
+using SurfaceLegend = std::function<void(Image&, const Eigen::Matrix3d& from_rec709, const LegendPlace& place)>;
+
+/// That of a bar. @param color  At a position from 0 to 1, linear Rec. 709.
+SurfaceLegend bar_legend(const std::string& title, const ValueRange& range,
+                         const std::function<Eigen::Vector3d(double)>& color);
+
+/// Its name and unit, as the title of a legend.
+std::string invariant_title(Invariant which, const FieldUnits& units);
 
 /// How the points of paths are coloured.
 struct PathColors {
   /// The colour of each point of each path, linear Rec. 709, 0 to 1. Empty: paths have the colour of their material.
   std::vector<std::vector<Eigen::Vector3d>> of_points;
-  /// Draws a legend of the colours over a picture. `from_rec709`: to the picture's colours. May be empty.
-  std::function<void(Image&, const Eigen::Matrix3d& from_rec709)> legend;
+  SurfaceLegend legend;  ///< May be empty.
 };
 
 /// Chooses the range of values if the description does not give it. If colours are those of wavelengths, paths that lie
 /// in one another have the mean of their colours: light is white, or whatever its wavelengths give, until they part.
 /// @param paths   Those of one seed stand beside each other, by wavelength.
 /// @param radius  Paths nearer to each other than this lie in one another, world units.
-PathColors path_colors(const PathColorDescription& description, const std::vector<Path>& paths, double radius);
+PathColors path_colors(const PathColorDescription& description, const std::vector<Path>& paths, double radius,
+                       const FieldUnits& units);
 
 /// The typical radius of the drawn paths, world units. If the scene does not give it, it is small enough that this
 /// number of parallel paths through the volume would not touch.

@@ -18,7 +18,7 @@ namespace tensorray {
 namespace {
 
 constexpr double max_radii = 2e5;  // Rays start 5e-7 diagonals away from a surface, which is then a tenth of a radius.
-constexpr double legend_width = 0.2;    // Part of the picture's width that a chosen camera leaves free.
+constexpr double most_legend = 0.3;     // Of the picture's width, that a chosen camera leaves free.
 constexpr double tube_tolerance = 0.2;  // Pixels: greatest distance of a tube's triangles from its surface.
 
 /// The points that a camera without a given position must show.
@@ -91,6 +91,7 @@ struct StageRun {
   RenderJob* job;  ///< Null: this process alone, and nothing is kept.
   const Progress& progress;
   const RenderCallbacks& callbacks;
+  std::vector<SurfaceLegend>& legends;  ///< Gets those of surfaces.
 };
 
 class LoadedPaths : public LoadedMethod {
@@ -112,7 +113,7 @@ SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<P
   const ShownLight& light = paths_.lights.light;
   std::vector<Material> materials{load_material(paths_.settings.material, light)};
   std::vector<ShadedSurface> surfaces{std::move(path_surface)};
-  add_context(scene, paths_, run.job, run.progress, surfaces, materials);
+  add_context(scene, paths_, run.job, run.progress, surfaces, materials, run.legends);
   const std::vector<Light> lights = make_lights(scene.description, paths_.lights, camera);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
@@ -151,11 +152,15 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   const auto drawing = Clock::now();
   const PathColors colors =
       path_colors(description.color, result.paths,
-                  typical_radius(description.radius, result.paths.size(), scene.field.world_box()));
-  // As an annotation, the legend covers a part of the picture: it has no effect on other files.
-  const bool has_room = description.color.legend && colors.legend;
-  const Camera camera = make_camera(scene.description, points_of_interest(scene, description.context, result.paths),
-                                    has_room ? legend_width : 0);
+                  typical_radius(description.radius, result.paths.size(), scene.field.world_box()), units_of(scene));
+  const bool has_legend = colors.legend || description.context.slice;
+  // A legend that is asked for as an annotation is beside the picture: it has no effect on other files.
+  if (has_legend && (description.color.legend || output.default_annotations)) {
+    const Eigen::Vector2i& size = scene.description.camera.resolution;
+    result.legend_room = std::min(legend_width(size.x(), size.y()), static_cast<int>(most_legend * size.x()));
+  }
+  const Camera camera =
+      make_camera(scene.description, points_of_interest(scene, description.context, result.paths), result.legend_room);
   PathShapes shapes = make_shapes(scene, paths_, result.paths, colors, camera);
   result.exposure = 0;
   if (has_picture) result.view = picture_view(camera);
@@ -163,9 +168,12 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     result.view->pixel_size = pixel_size(camera, camera.position + camera.focus_distance * camera.forward);
     result.notes.push_back("the scale bar is that of the middle of the scene, as the camera is in perspective");
   }
-  if (colors.legend && (description.color.legend || output.wants(Annotation::legend)))
-    result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double exposure) {
-      legend(image, std::exp2(exposure) * matrix);
+  const auto legends = std::make_shared<std::vector<SurfaceLegend>>();
+  if (colors.legend) legends->push_back(colors.legend);
+  if (has_legend && (description.color.legend || output.wants(Annotation::legend)))
+    result.draw_legend = [legends, matrix = light.rec709_to_working](Image& image, double exposure) {
+      for (std::size_t i = 0; i < legends->size(); ++i)
+        (*legends)[i](image, std::exp2(exposure) * matrix, {i, legends->size()});
     };
   if (output.wants("tubes"))
     result.write_tubes = [tubes = turned(std::move(shapes.tubes), scene.description.turn().transpose()), colors](
@@ -180,7 +188,7 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     set_picture(picture, light, description, scene.description, render);
   };
   const RenderCallbacks callbacks = render_callbacks(progress, job, result, add_picture);
-  const StageRun run{job, progress, callbacks};
+  const StageRun run{job, progress, callbacks, *legends};
   add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, run), result);
   result.statistics.seconds_drawing = seconds_since(drawing);
   return result;

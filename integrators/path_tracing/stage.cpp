@@ -107,18 +107,17 @@ Camera with_lens(Camera camera, const CameraDescription& description) {
 }
 
 /// A camera that shows the points in the left part of the picture: made for a narrower one, and moved along its plane.
-Camera chosen_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double free) {
-  const double free_pixels = std::floor(free * description.resolution.x());
+Camera chosen_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, int free) {
   Framing framing;
   framing.projection = description.projection;
   if (description.direction) framing.direction = *description.direction;
   if (description.up) framing.up = *description.up;
   framing.angle = description.angle;
-  framing.resolution = description.resolution - Eigen::Vector2i(static_cast<int>(free_pixels), 0);
+  framing.resolution = description.resolution - Eigen::Vector2i(free, 0);
   Camera camera = frame_points(points, framing);
   camera.resolution = description.resolution;
   const double pixel = pixel_size(camera, camera.position + camera.focus_distance * camera.forward);
-  camera.position += free_pixels / 2 * pixel * camera.right;
+  camera.position += 0.5 * free * pixel * camera.right;
   return camera;
 }
 
@@ -255,7 +254,7 @@ void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::v
   }
 }
 
-Camera make_camera(const SceneDescription& scene, const std::vector<Eigen::Vector3d>& points, double free) {
+Camera make_camera(const SceneDescription& scene, const std::vector<Eigen::Vector3d>& points, int free) {
   try {
     return with_lens(
         scene.camera.position ? given_camera(scene.camera, points) : chosen_camera(scene.camera, points, free),

@@ -11,6 +11,7 @@
 
 #include "base/process/progress.h"
 #include "integrators/path_tracing/load_paths.h"
+#include "integrators/path_tracing/path_colors.h"
 #include "integrators/path_tracing/path_tracing_method.h"
 #include "renderer/camera/camera.h"
 #include "renderer/camera/path_tracer.h"
@@ -25,9 +26,9 @@
 namespace tensorray {
 
 /// The camera of the scene; if it has no position, a camera that shows all of `points`.
-/// @param free  Part of the picture's width that such a camera leaves free at the right.
+/// @param free  Pixels that such a camera leaves free at the right.
 /// @throw SceneError naming the values that do not fit together.
-Camera make_camera(const SceneDescription& scene, const std::vector<Eigen::Vector3d>& points, double free);
+Camera make_camera(const SceneDescription& scene, const std::vector<Eigen::Vector3d>& points, int free);
 
 /// The lights of the scene; if it has none, a white sky and a lamp at the viewer's upper left.
 std::vector<Light> make_lights(const SceneDescription& description, const ShownLights& shown, const Camera& camera);
@@ -64,10 +65,12 @@ ShadedSurface read_mesh_surface(const SceneDescription& scene, const std::filesy
                                 std::optional<double> smooth_angle = {});
 
 /// Adds the scene's context to `surfaces`, and the materials that it needs to `materials`.
+/// @param legends  Gets that of the slice.
 /// @param job  Whose ranks make the light on the plate together, and which keeps it; null: alone.
 /// @throw SceneError if a slice or an isosurface is empty; Cancelled (light is traced for the plate); as
 /// Ranks::all_gather.
 void add_context(const Scene& scene, const PathScene& paths, Job* job, const Progress& progress,
-                 std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials);
+                 std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials,
+                 std::vector<SurfaceLegend>& legends);
 
 }  // namespace tensorray

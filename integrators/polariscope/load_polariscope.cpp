@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -46,8 +47,28 @@ double greatest_integral(const Scene& scene, PolarizedLight light) {
   std::vector<float> integrals;
   for (const LightRow& row : rows)
     for (const PolarPoint& point : row.points)
+<<<<<<< HEAD
       if (point.length > 0) integrals.push_back(static_cast<float>(point.integral / 2));
   return greatest_of_most(integrals) / light.strength;
+=======
+      if (point.length > 0) integrals.push_back(point.integral / 2);
+  return greatest_of_most(integrals);
+}
+
+/// Metres in a unit of length; 1 if it is empty, or of another name.
+double metres_in(const std::string& unit) {
+  static const std::map<std::string, double> units{{"nm", 1e-9}, {"um", 1e-6}, {"mm", 1e-3},   {"cm", 1e-2},
+                                                   {"m", 1},     {"km", 1e3},  {"in", 0.0254}, {"ft", 0.3048}};
+  const auto found = units.find(unit);
+  return found == units.end() ? 1 : found->second;
+}
+
+/// A number as it is printed, so that a scene can have the same.
+double rounded(double value) {
+  const std::string text = fmt::format("{:.6g}", value);
+  std::from_chars(text.data(), text.data() + text.size(), value);  // In any locale.
+  return value;
+>>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
 }
 
 double choose_coefficient(const Scene& scene, const PolarizedLight& light, double unit_length, double wavelength,
@@ -102,6 +123,8 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
   if (scene.description.light.wavelength_min == scene.description.light.wavelength_max) light.bands.front().width = 0;
   light.reference = reference_channel(scene);
   light.samples = settings.samples.value_or(2);
+  const FieldUnits units = units_of(scene);
+  const double unit_length = settings.unit_length.value_or(metres_in(units.length));
   const double wavelength = loaded.wavelength = light.bands[light.reference].wavelength;
   if (scene.description.light.aperture) {
     light.aperture.emplace();
@@ -120,12 +143,24 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
   } else if (const auto* number = std::get_if<double>(&settings.stress_optic)) {
     loaded.stress_optic = *number;
   } else {
-    loaded.stress_optic = choose_coefficient(scene, light, settings.unit_length, wavelength, notes);
+    loaded.stress_optic = choose_coefficient(scene, light, unit_length, wavelength, notes);
   }
+<<<<<<< HEAD
   light.strength = pi * loaded.stress_optic * settings.unit_length / (wavelength * nanometre);
   if (!std::isfinite(static_cast<float>(light.strength * scene.field.max_norm())))
     throw std::runtime_error("`/integrator/stress_optic` times the field is beyond single precision; check its units");
   loaded.arrangement = turned(settings.arrangement, settings.angle, settings.analyzer);
+=======
+  if (!std::isfinite(static_cast<float>(loaded.stress_optic * unit_length * scene.field.max_norm())))
+    throw std::runtime_error("`/integrator/stress_optic` times the field is beyond single precision; check its units");
+  loaded.order_note = fmt::format("1 order: {:g} nm", wavelength);
+  if (!units.tensor.empty() && !units.length.empty())
+    loaded.order_note +=
+        fmt::format(", {:.3g} {} {}", wavelength * nanometre / std::abs(loaded.stress_optic * unit_length),
+                    units.tensor, units.length);
+  light.strength = pi * loaded.stress_optic * unit_length / (wavelength * nanometre);
+  loaded.arrangement = turned(arrangement_of(settings.arrangement), settings.angle, settings.analyzer);
+>>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
   return loaded;
 }
 

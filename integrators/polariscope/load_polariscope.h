@@ -18,6 +18,9 @@ struct LoadedLightOfPolariscope {
   PolarizedLight light;
   double stress_optic = 0;  ///< C at the reference wavelength.
   double wavelength = 0;    ///< The reference wavelength, nm.
+  /// What an order is: a retardance and, if units are known, the difference of principal stresses times the length that
+  /// makes it (the material's fringe value).
+  std::string order_note;
   Arrangement arrangement;  ///< Turned.
 };
 

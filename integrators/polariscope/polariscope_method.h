@@ -24,9 +24,15 @@ TENSORRAY_VALUE(StressOptic);
 struct PolariscopeDescription {
   Arrangement arrangement = named_arrangements().front().elements;
   double angle = 0, analyzer = 0;  ///< Degrees.
+<<<<<<< HEAD
   StressOptic stress_optic = OpticChoice::automatic;
   double unit_length = 1;      ///< Metres in a unit of world space.
   std::optional<int> samples;  ///< Of a pixel along x and y; none: 2.
+=======
+  StressOpticDescription stress_optic = OpticChoice::automatic;
+  std::optional<double> unit_length;  ///< Metres in a unit of world space; none: by the scene's unit, or 1.
+  std::optional<int> samples;         ///< Of a pixel along x and y; none: 2.
+>>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
 };
 
 inline void describe(PolariscopeDescription& settings, KeyVisitor& visit) {
@@ -40,7 +46,9 @@ inline void describe(PolariscopeDescription& settings, KeyVisitor& visit) {
         "polariscope: stress-optic coefficient, 1 / unit of the field (1e-12/Pa is a brewster), or a text file of "
         "wavelengths (nm) and coefficients; auto: about four orders in the picture",
         knob());
-  visit("unit_length", settings.unit_length, "polariscope: metres in one unit of world space", above(0));
+  visit("unit_length", settings.unit_length,
+        "polariscope: metres in one unit of world space; default: by `world.unit` or the field's file, else 1",
+        above(0));
   visit("samples", settings.samples, "lens, polariscope: samples of a pixel along x and along y", between(1, 16));
 }
 

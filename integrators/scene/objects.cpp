@@ -158,7 +158,7 @@ void make_tubes(const Scene& scene, double tolerance, Job* job, const Progress& 
     const PathTracingDescription& tracing = object.paths->settings;
     const std::vector<Path> paths = follow_paths(scene, *object.paths, true, job, progress, ends);
     const double radius = typical_radius(tracing.radius, paths.size(), scene.field.world_box());
-    const PathColors colors = path_colors(tracing.color, paths, radius);
+    const PathColors colors = path_colors(tracing.color, paths, radius, {});
     object.surface = path_surface(path_mesh(paths, tracing, colors, radius, tolerance), paths, colors,
                                   object.paths->lights.light.rec709_to_working);
   }

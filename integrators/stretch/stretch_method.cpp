@@ -79,7 +79,12 @@ void draw(const Scene& scene, const std::vector<float>& values, const Eigen::Vec
                    &linear.pixels[i * linear.channels.size()]);
     Eigen::Map<Eigen::Vector4f>(&display.pixels[4 * i]) = colormap_srgb(map, position).cast<float>().homogeneous();
   }
-  draw_color_bar(display, {"1/length", range, [](double position) { return colormap_srgb(map, position); }});
+  if (scene.description.output.wants(Annotation::legend)) {
+    const std::string length = units_of(scene).length;
+    const ColorBar bar{"stretch\n1/" + (length.empty() ? "length" : length), range,
+                       [](double position) { return colormap_srgb(map, position); }};
+    render.draw_legend = [bar](Image& image, double) { draw_color_bar(image, bar); };
+  }
   render.linear = std::move(linear);
   render.display = std::move(display);
 }
@@ -138,7 +143,11 @@ class StretchMethod : public MethodWith<StretchKeys> {
     return picture_outputs({{"stretch", "the stretch in the volume, as a float grid", {".vdb"}, write_grids}});
   }
 
-  void check(SceneDescription& scene, const Json&, const SceneSource& source, bool chosen) const override {
+  void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
+    if (chosen && !given(json, "/output/annotations")) {
+      scene.output.annotations = {Annotation::legend};
+      scene.output.default_annotations = true;
+    }
     if (chosen && scene.bending.rgb && settings().stretch.wavelength)
       source.fail(
           "`/integrator/stretch/wavelength`: light has no wavelength where `/bending/rgb` is given; remove one "

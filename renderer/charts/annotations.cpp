@@ -16,8 +16,10 @@ namespace {
 
 using Eigen::AlignedBox2d, Eigen::Vector2d, Eigen::Vector3d;
 
-constexpr double longest_bar = 0.4;  // Of the picture's shorter side.
-constexpr double end_on = 0.1;       // An axis that is shorter than this in the picture points at the viewer, or away.
+constexpr double longest_bar = 0.4;    // Of the picture's shorter side.
+constexpr double below_letters = 2.5;  // Room, in heights of a letter.
+constexpr double between = 0.38;       // Sine of 22.5 degrees.
+constexpr double end_on = 0.1;  // An axis that is shorter than this in the picture points at the viewer, or away.
 
 /// Sizes in pixels.
 struct Sizes {
@@ -27,7 +29,7 @@ struct Sizes {
   double margin;   // Distance from the edges of the picture.
 
   explicit Sizes(const Image& image)
-      : letter(std::max(11.0, 0.024 * std::min(image.width, image.height))),
+      : letter(letter_height(image.width, image.height)),
         line(std::max(2.0, std::round(letter / 7))),
         outline(std::max(1.0, letter / 11)),
         margin(std::round(letter)) {}
@@ -92,6 +94,17 @@ std::vector<Mark> axis_marks(int axis, const Vector3d& direction, const Sizes& s
   return {{-a, a, "", sizes.line}, {-b, b, "", sizes.line}, letter};
 }
 
+/// The picture in the upper left corner of a larger one, by an even number of pixels, as films need it.
+Image enlarged(const Image& image, double right, double below) {
+  const auto even = [](double pixels) { return 2 * static_cast<int>(std::ceil(pixels / 2)); };
+  Image result(image.width + even(right), image.height + even(below), image.channels);
+  const bool is_white = is_light(image, {Vector2d(0, 0), Vector2d(image.width, image.height)});
+  fill_box(result, {Vector2d(0, 0), Vector2d(result.width, result.height)}, Vector3d::Constant(is_white));
+  for (int y = 0; y < image.height; ++y)
+    std::copy_n(image.pixel(0, y), image.channels.size() * static_cast<std::size_t>(image.width), result.pixel(0, y));
+  return result;
+}
+
 /// The dashes of a stroke. They follow the picture's columns or rows, so that those of its neighbours go on.
 void add_dashes(const OutlineStroke& stroke, double dash, double width, std::vector<Mark>& marks) {
   const Vector2d way = stroke.to - stroke.from;
@@ -116,10 +129,20 @@ double round_length(double limit) {
   return decade;
 }
 
-void draw_scale_bar(Image& image, double pixel_size) {
+Image with_room_beside(const Image& image) {
+  int room = 0;
+  for (int i = 0; i < 8; ++i) room = legend_width(image.width + room, image.height);  // Letters may grow with it.
+  return enlarged(image, room, 0);
+}
+
+Image with_room_below(const Image& image) {
+  return enlarged(image, 0, below_letters * letter_height(image.width, image.height));
+}
+
+void draw_scale_bar(Image& image, double pixel_size, const std::string& unit) {
   const Sizes sizes(image);
   const double length = round_length(longest_bar * std::min(image.width, image.height) * pixel_size);
-  const std::string number = round_ticks({0, length}, 2).back().label;
+  const std::string number = round_ticks({0, length}, 2).back().label + " " + (unit.empty() ? "units" : unit);
   const Vector2d left(sizes.margin, image.height - sizes.margin), right(left + Vector2d(length / pixel_size, 0));
   const Vector2d end(0, sizes.letter / 2), thick(0, sizes.line), wide(sizes.line, 0);
   // They do not overlap: ink that lies twice on a pixel at the end would make the bar longer.
@@ -139,7 +162,9 @@ void draw_scale_bar(Image& image, double pixel_size) {
 void draw_caption(Image& image, const std::string& text) {
   const Sizes sizes(image);
   const Vector2d right(image.width - sizes.margin, image.height - sizes.margin);
-  const std::vector<Mark> marks{{right - Vector2d(text_width(text, sizes.letter), 0), {}, text, sizes.letter}};
+  const double room = std::max(1.0, image.width - 2 * sizes.margin);
+  const double letter = std::min(sizes.letter, room / text_width(text, 1));
+  const std::vector<Mark> marks{{right - Vector2d(text_width(text, letter), 0), {}, text, letter}};
   draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
 }
 
@@ -153,6 +178,7 @@ void draw_axes(Image& image, const Vector3d& right, const Vector3d& up) {
   draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
 }
 
+<<<<<<< HEAD
 void draw_directions(Image& image, const std::vector<std::pair<std::string, double>>& directions) {
   const Sizes sizes(image);
   const double from_corner = sizes.margin + 4 * sizes.letter;
@@ -165,6 +191,26 @@ void draw_directions(Image& image, const std::vector<std::pair<std::string, doub
     marks.push_back({center + 1.5 * tip + corner, {}, text, sizes.letter});
   }
   if (!marks.empty()) draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
+=======
+std::string anatomical_letters(const Vector3d& direction) {
+  std::array<int, 3> axes{0, 1, 2};
+  std::sort(axes.begin(), axes.end(), [&](int a, int b) { return std::abs(direction[a]) > std::abs(direction[b]); });
+  std::string letters;
+  for (const int axis : axes)
+    if (letters.empty() || std::abs(direction[axis]) > between) letters += (direction[axis] > 0 ? "RAS" : "LPI")[axis];
+  return letters;
+}
+
+void draw_anatomy(Image& image, const Vector3d& right, const Vector3d& up, int room) {
+  const Sizes sizes(image);
+  const Vector2d size(image.width - room, image.height);
+  for (const Vector2d& side : {Vector2d(1, 0), Vector2d(-1, 0), Vector2d(0, 1), Vector2d(0, -1)}) {
+    std::vector<Mark> marks{{{0, 0}, {}, anatomical_letters(side.x() * right - side.y() * up), sizes.letter}};
+    const Vector2d free = size - extent_of(marks).sizes() - Vector2d::Constant(2 * sizes.margin);
+    shift((size + side.cwiseProduct(free)) / 2 - extent_of(marks).center(), marks);
+    draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
+  }
+>>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
 }
 
 void draw_outline(Image& image, const std::vector<OutlineStroke>& strokes, bool visible, bool hidden) {
@@ -176,31 +222,6 @@ void draw_outline(Image& image, const std::vector<OutlineStroke>& strokes, bool 
     else if (!stroke.is_hidden && visible)
       marks.push_back({stroke.from, stroke.to, "", sizes.line});
   if (!marks.empty()) draw_marks(image, marks, sizes.outline / 2, is_light(image, extent_of(marks)));
-}
-
-void draw_color_strip(Image& image, const ColorStrip& strip) {
-  const Sizes sizes(image);
-  const double gap = sizes.letter / 2, length = std::round(std::min(0.2 * image.width, 10 * sizes.letter));
-  const double behind = strip.right.empty() ? 0 : text_width(strip.right, sizes.letter) + gap;
-  const double top = sizes.margin, bottom = top + std::round(sizes.letter);
-  const double end = std::round(image.width - sizes.margin - behind), begin = end - length;
-  const double below = image.width - sizes.margin - text_width(strip.note, sizes.letter);
-  std::vector<Mark> texts;
-  const auto add = [&](double x, double y, const std::string& text) {
-    if (!text.empty()) texts.push_back({{x, y}, {}, text, sizes.letter});
-  };
-  add(begin - gap - text_width(strip.left, sizes.letter), bottom, strip.left);
-  add(end + gap, bottom, strip.right);
-  add(below, bottom + gap + sizes.letter, strip.note);
-  const AlignedBox2d bar(Vector2d(begin, top), Vector2d(end, bottom));
-  const bool on_light = is_light(image, extent_of(texts).merged(bar));
-  const Vector2d outline = Vector2d::Constant(sizes.outline), frame = Vector2d::Constant(sizes.line / 2) + outline;
-  fill_box(image, {bar.min() - frame, bar.max() + frame}, Vector3d::Constant(on_light));
-  fill_box(image, {bar.min() - frame + outline, bar.max() + frame - outline}, Vector3d::Constant(!on_light));
-  for_each_pixel(image, bar, [&](int x, int y, double coverage) {
-    lay_over(image, x, y, strip.color(std::clamp((x + 0.5 - begin) / length, 0.0, 1.0)), coverage);
-  });
-  draw_marks(image, texts, sizes.outline, on_light);
 }
 
 }  // namespace tensorray

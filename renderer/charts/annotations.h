@@ -1,9 +1,8 @@
 #pragma once
 /// @file renderer/charts/annotations.h
-/// Small drawings in the corners of a picture that say how to read it: a scale bar, a caption, the axes of the
-/// world, a strip of colours. And the lines of bodies over it.
+/// Small drawings that say how to read a picture: a scale bar and the axes of the world in its corners, directions of a
+/// patient at its edges, a caption below it. And the lines of bodies over it.
 
-#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,16 +15,21 @@ namespace tensorray {
 
 // All functions draw over the first three channels of a picture; a channel "A" becomes opaque under what they draw. The
 // picture may be scene-linear or display-referred; 1 is taken as white. They draw black on light grounds and white on
-// dark ones, with a thin outline of the other. Capital letters have 0.024 of the shorter side, 11 pixels at least.
+// dark ones, with a thin outline of the other. Letters are as high as letter_height says.
 
 /// The greatest length of the form 1, 2 or 5 times a power of ten that is not above `limit` (finite, > 0).
 double round_length(double limit);
 
 /// Draws a scale bar in the lower left corner: a round length of at most 0.4 of the picture's shorter side, and its
-/// number. @param pixel_size  World units along x; finite, > 0.
-void draw_scale_bar(Image& image, double pixel_size);
+/// number. @param pixel_size  World units along x; finite, > 0. @param unit  Of world space; empty: not known.
+void draw_scale_bar(Image& image, double pixel_size, const std::string& unit);
 
-/// Draws a line of text in the lower right corner.
+/// A picture with room at its right or below it, as a legend or a line of text needs it: black or white, as the picture
+/// is dark or light. The room depends on the size of the picture alone, so that all frames of a film have one size.
+Image with_room_beside(const Image& image);
+Image with_room_below(const Image& image);
+
+/// Draws a line of text in the lower right corner; a long one is smaller.
 void draw_caption(Image& image, const std::string& text);
 
 /// Draws the axes of the world as the picture shows them, in the upper left corner, with the letters x, y, z. An axis
@@ -33,6 +37,7 @@ void draw_caption(Image& image, const std::string& text);
 /// @param right, up  Directions of the picture in the world; unit, normal to each other.
 void draw_axes(Image& image, const Eigen::Vector3d& right, const Eigen::Vector3d& up);
 
+<<<<<<< HEAD
 /// Draws lines through one point in the upper right corner, each with a text at one end, and its angle from right to
 /// up, degrees.
 void draw_directions(Image& image, const std::vector<std::pair<std::string, double>>& directions);
@@ -43,9 +48,14 @@ struct ColorStrip {
   std::function<Eigen::Vector3d(double)> color;  ///< At a position from 0 to 1, in the colour space of the picture.
   std::string note;                              ///< A line below. May be empty.
 };
+=======
+/// The letters of a direction of a patient in RAS: R, L (right, left: +x, -x), A, P (anterior, posterior: y), S, I
+/// (superior, inferior: z). A direction between them has several letters, the nearest one first.
+std::string anatomical_letters(const Eigen::Vector3d& direction);
+>>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
 
-/// Draws it in the upper right corner.
-void draw_color_strip(Image& image, const ColorStrip& strip);
+/// Draws them at the four edges. @param room  Pixels at the right of the picture that belong to a legend.
+void draw_anatomy(Image& image, const Eigen::Vector3d& right, const Eigen::Vector3d& up, int room);
 
 /// A straight part of a line of a body, in pixels.
 struct OutlineStroke {

@@ -4,7 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstddef>
+#include <sstream>
 #include <stdexcept>
 
 #include <Eigen/Geometry>
@@ -87,12 +87,11 @@ struct Layout {
   double line;    ///< Width of lines; a whole number of pixels, so that lines are sharp.
 
   explicit Layout(const Image& image)
-      : letter(std::max(7.0, 0.024 * std::min(image.width, image.height))),
-        line(std::max(1.0, std::round(0.09 * letter))) {}
+      : letter(letter_height(image.width, image.height)), line(std::max(1.0, std::round(0.09 * letter))) {}
 
-  double padding() const { return 0.9 * letter; }
-  double gap() const { return 0.5 * letter; }    ///< Distance between a mark and its label.
-  double title() const { return 2.1 * letter; }  ///< Distance from the top of the title to the contents below.
+  double padding() const { return 0.6 * letter; }
+  double gap() const { return 0.5 * letter; }  ///< Distance between a mark and its label, or a title and the contents.
+  double row() const { return 1.6 * letter; }  ///< Distance between the lines of a title.
   double swatch() const { return std::round(1.5 * letter); }  ///< Width of the colour bar and of the squares of a key.
 };
 
@@ -102,16 +101,29 @@ struct Panel {
 };
 
 /// Draws a panel at the right edge of the picture, with room for contents of the given size, and writes the title.
-Panel lay_panel(Image& image, const Layout& layout, const Eigen::Vector2d& size, const std::string& title) {
+/// @return with the place of the contents.
+Panel lay_panel(Image& image, const Layout& layout, Eigen::Vector2d size, const std::string& title,
+                const LegendPlace& place) {
+  std::vector<std::string> lines;
+  std::istringstream text(title);
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  for (const std::string& line : lines) size.x() = std::max(size.x(), text_width(line, layout.letter));
+  const double top = std::round(layout.row() * static_cast<double>(lines.size()) + (lines.empty() ? 0 : layout.gap()));
   const double padding = std::round(layout.padding());
-  const Eigen::Vector2d full = (size + Eigen::Vector2d::Constant(2 * padding)).array().ceil();
-  const Eigen::Vector2d corner(image.width - full.x() - padding, std::floor((image.height - full.y()) / 2));
+  const Eigen::Vector2d full = (size + Eigen::Vector2d(2 * padding, top + 2 * padding)).array().ceil();
+  const double middle = (static_cast<double>(place.part) + 0.5) / static_cast<double>(place.parts) * image.height;
+  const Eigen::Vector2d corner(image.width - full.x() - padding, std::floor(middle - full.y() / 2));
   const Box outside(corner, Eigen::Vector2d(corner + full));
   const bool on_light = is_light(image, outside);
   fill_box(image, outside, Eigen::Vector3d::Constant(on_light), on_light ? 0.75 : 0.6);
   const Eigen::Vector2d inset = Eigen::Vector2d::Constant(padding);
-  const Panel panel{Box(outside.min() + inset, outside.max() - inset), Eigen::Vector3d::Constant(!on_light)};
-  draw_text(image, panel.inside.min() + Eigen::Vector2d(0, layout.letter), layout.letter, title, panel.ink);
+  Panel panel{Box(outside.min() + inset, outside.max() - inset), Eigen::Vector3d::Constant(!on_light)};
+  Eigen::Vector2d at = panel.inside.min() + Eigen::Vector2d(0, layout.letter);
+  for (const std::string& line : lines) {
+    draw_text(image, at, layout.letter, line, panel.ink);
+    at.y() += layout.row();
+  }
+  panel.inside.min().y() += top;
   return panel;
 }
 
@@ -140,29 +152,26 @@ void write_label(Image& image, const Layout& layout, double left, double middle,
 
 }  // namespace
 
+int legend_width(int width, int height) { return static_cast<int>(10 * letter_height(width, height)); }
+
 std::vector<Tick> round_ticks(const ValueRange& range, int most) {
   check(range);
   if (most < 2) throw std::invalid_argument("a scale needs at least two ticks");
   return range.logarithmic ? logarithmic_ticks(range, most) : linear_ticks(range, most);
 }
 
-ColorKey direction_key() {
-  return {"", {{"x", Eigen::Vector3d(1, 0, 0)}, {"y", Eigen::Vector3d(0, 1, 0)}, {"z", Eigen::Vector3d(0, 0, 1)}}};
-}
-
-void draw_color_bar(Image& image, const ColorBar& bar) {
+void draw_color_bar(Image& image, const ColorBar& bar, const LegendPlace& place) {
   check(image);
   check(bar.range);
   if (!bar.color) throw std::invalid_argument("a colour bar needs colours");
   const Layout layout(image);
-  const std::vector<Tick> ticks = round_ticks(bar.range, 7);
-  const double height = std::round(0.6 * image.height), top = bar.title.empty() ? layout.letter / 2 : layout.title();
+  const double height = std::round(0.6 * image.height / static_cast<double>(place.parts)), end = layout.letter / 2;
+  const std::vector<Tick> ticks = round_ticks(bar.range, std::clamp(static_cast<int>(height / layout.row()), 2, 7));
   const double mark = std::round(0.4 * layout.letter), labels = layout.swatch() + 2 * layout.line + mark + layout.gap();
-  const Eigen::Vector2d size(std::max(labels + widest(ticks, layout.letter), text_width(bar.title, layout.letter)),
-                             top + height + layout.letter / 2);
-  const Panel panel = lay_panel(image, layout, size, bar.title);
+  const Panel panel =
+      lay_panel(image, layout, {labels + widest(ticks, layout.letter), height + 2 * end}, bar.title, place);
 
-  const Eigen::Vector2d corner = panel.inside.min() + Eigen::Vector2d(layout.line, std::round(top));
+  const Eigen::Vector2d corner = panel.inside.min() + Eigen::Vector2d(layout.line, std::round(end));
   const Box box(corner, Eigen::Vector2d(corner + Eigen::Vector2d(layout.swatch(), height)));
   for_each_pixel(image, box, [&](int x, int y, double coverage) {
     lay_over(image, x, y, bar.color(std::clamp((box.max().y() - y - 0.5) / height, 0.0, 1.0)), coverage);
@@ -176,17 +185,15 @@ void draw_color_bar(Image& image, const ColorBar& bar) {
   }
 }
 
-void draw_color_key(Image& image, const ColorKey& key) {
+void draw_color_key(Image& image, const ColorKey& key, const LegendPlace& place) {
   check(image);
   if (key.entries.empty()) throw std::invalid_argument("a key of colours needs entries");
   const Layout layout(image);
-  const double top = key.title.empty() ? 0 : layout.title(), row = std::round(2.1 * layout.letter);
+  const double row = std::round(2.1 * layout.letter);
   const double label = layout.swatch() + 2 * layout.line + layout.gap();
   const double rows = row * static_cast<double>(key.entries.size() - 1) + layout.swatch() + 2 * layout.line;
-  const Eigen::Vector2d size(std::max(label + widest(key.entries, layout.letter), text_width(key.title, layout.letter)),
-                             top + rows);
-  const Panel panel = lay_panel(image, layout, size, key.title);
-  Eigen::Vector2d corner = panel.inside.min() + Eigen::Vector2d(layout.line, std::round(top) + layout.line);
+  const Panel panel = lay_panel(image, layout, {label + widest(key.entries, layout.letter), rows}, key.title, place);
+  Eigen::Vector2d corner = panel.inside.min() + Eigen::Vector2d::Constant(layout.line);
   for (const ColorKeyEntry& entry : key.entries) {
     const Box square(corner, Eigen::Vector2d(corner + Eigen::Vector2d::Constant(layout.swatch())));
     fill_box(image, square, entry.color);

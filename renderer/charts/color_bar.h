@@ -2,6 +2,7 @@
 /// @file renderer/charts/color_bar.h
 /// Legends drawn into pictures: a labelled colour bar for numbers, and a key that lists colours and their meanings.
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <vector>
@@ -26,7 +27,7 @@ struct Tick {
 std::vector<Tick> round_ticks(const ValueRange& range, int most);
 
 struct ColorBar {
-  std::string title;  ///< Short; printable ASCII, as in lettering.h. May be empty.
+  std::string title;  ///< Short lines; printable ASCII, as in lettering.h. May be empty.
   ValueRange range;
   /// The colour at a position from 0 to 1, in the colour space of the picture.
   std::function<Eigen::Vector3d(double)> color;
@@ -43,16 +44,21 @@ struct ColorKey {
   std::vector<ColorKeyEntry> entries;
 };
 
-/// The key of colours that show the components of a direction: x red, y green, z blue.
-ColorKey direction_key();
+/// The width of a legend with short words, pixels. @param width, height  Of the picture that it is drawn into.
+int legend_width(int width, int height);
+
+/// Which of several equal parts of the right edge, from the top, a legend is in.
+struct LegendPlace {
+  std::size_t part = 0, parts = 1;
+};
 
 // Both functions draw into the first three channels of a picture. A channel "A" becomes opaque in proportion to the
-// opacity of the panel. The legend is on a translucent panel at the middle of the right edge; its size is proportional
-// to the shorter side of the picture. The panel is dark with white text, or light with black text, whichever is closer
+// opacity of the panel. The legend is on a translucent panel in the middle of a part of the right edge; its letters are
+// as high as letter_height says. The panel is dark with white text, or light with black text, whichever is closer
 // to the picture behind it. The picture may be scene-linear or display-referred; 1 is white.
 // @throw std::invalid_argument unless the picture begins with R, G, B; if the range, the bar or the key is empty.
 
-void draw_color_bar(Image& image, const ColorBar& bar);
-void draw_color_key(Image& image, const ColorKey& key);
+void draw_color_bar(Image& image, const ColorBar& bar, const LegendPlace& place = {});
+void draw_color_key(Image& image, const ColorKey& key, const LegendPlace& place = {});
 
 }  // namespace tensorray

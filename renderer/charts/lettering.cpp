@@ -159,6 +159,8 @@ void draw_text(Image& image, const Eigen::Vector2d& position, double height, con
   }
 }
 
+double letter_height(int width, int height) { return std::max(13.0, 0.028 * std::min(width, height)); }
+
 double text_width(const std::string& text, double height) {
   double width = 0;
   for (const char character : drawable(text)) width += glyph_of(character).width + stroke + gap;

@@ -23,6 +23,9 @@ namespace tensorray {
 void draw_text(Image& image, const Eigen::Vector2d& position, double height, const std::string& text,
                const Eigen::Vector3d& color, double outline = 0);
 
+/// The height of a capital letter in pictures of this size, pixels: legible also in a copy of half the size.
+double letter_height(int width, int height);
+
 /// The width of the line that `draw_text` draws, in pixels, from the left edge of the first character to the right edge
 /// of the last one. A line that starts at x = centre - width / 2 is centred.
 double text_width(const std::string& text, double height);

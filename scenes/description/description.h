@@ -88,6 +88,7 @@ struct FieldDescription {
   std::string name;                             ///< Name of the field in the file; empty: the only field.
   std::optional<GenerateDescription> generate;  ///< Generated field, instead of a file.
   Derive derive = Derive::none;
+  std::string unit;           ///< Of the tensor; empty: that of the file.
   ComponentGrids components;  ///< The grids that are the field's components; empty: found by their names.
   double smooth = 0;          ///< Deviation of the Gaussian that smooths the field, voxels; 0: none.
   bool noise = false;         ///< Whether the field is replaced by its noise alone (keep_noise).
@@ -248,6 +249,7 @@ enum class UpAxis { z, y };
 
 struct WorldDescription {
   UpAxis up = UpAxis::z;
+  std::string unit;  ///< Of lengths; empty: that of the field's file.
 };
 
 struct SceneDescription {

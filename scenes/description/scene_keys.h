@@ -33,6 +33,7 @@ inline void describe(FieldDescription& field, KeyVisitor& visit) {
   visit("derive", field.derive,
         "derivative that makes the tensor: gradient of a vector grid, hessian of a scalar grid, viscous_stress of a "
         "velocity or of its gradient, -viscous_stress: what acts in the whole stress -pI + viscous_stress");
+  visit("unit", field.unit, "unit of the tensor, for legends, such as MPa; default: that which the file notes");
   visit.section("components", field.components,
                 "scalar grids of the file that are the components, whatever their names");
   visit.exclude("components", {"generate"});
@@ -220,6 +221,8 @@ inline void describe(OutputDescription& output, KeyVisitor& visit) {
 
 inline void describe(WorldDescription& world, KeyVisitor& visit) {
   visit("up", world.up, "the axis that points up, here and in the files that are read and written: z or y");
+  visit("unit", world.unit,
+        "unit of lengths, for scale bars and legends, such as mm; default: that which the field's file notes");
 }
 
 /// An item of `obstacles`.
@@ -237,7 +240,7 @@ inline void describe(SceneDescription& scene, KeyVisitor& visit) {
   std::string schema;  // Only editors use it.
   visit("$schema", schema, "path of this schema, for editors");
   visit("seed", scene.seed, "seed of the random numbers", between(0, largest_exact_integer));
-  visit.section("world", scene.world, "the axes of the scene");
+  visit.section("world", scene.world, "the axes and the unit of the scene");
   visit.section("field", scene.field, "the tensor field");
   visit.section("bending", scene.bending, "how the field bends light");
   visit.section("light", scene.light, "parallel light through the volume");

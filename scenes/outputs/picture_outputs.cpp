@@ -10,6 +10,7 @@
 
 #include "base/text/path_text.h"
 #include "renderer/charts/annotations.h"
+#include "renderer/charts/color_bar.h"
 #include "renderer/color/color.h"
 #include "renderer/spectra/spectrum.h"
 #include "volumes/files/tensor_files.h"
@@ -91,32 +92,28 @@ void write_maps(const std::filesystem::path& file, const Scene& scene, const Ren
 constexpr double unseen = 0.5;  // Grey of wavelengths that the eye does not see.
 constexpr double pale = 0.03;   // Part of white in the colour of a wavelength, which makes it reproducible.
 
-ColorStrip wavelength_strip(const Scene& scene) {
-  const double min = scene.description.light.wavelength_min, max = scene.description.light.wavelength_max;
-  const Eigen::Matrix3d from_rec709 = scene.color.xyz_to_working() * rec709_to_xyz();
-  ColorStrip strip;
-  if (min < max) strip.left = fmt::format("{:g}", min);
-  strip.right = fmt::format("{:g} nm", max);
-  strip.color = [=](double position) -> Eigen::Vector3d {
-    return from_rec709 * wavelength_color(min + position * (max - min));
-  };
-  return strip;
-}
-
-/// Red, green and blue, with their flexibilities.
-ColorStrip rgb_strip(const Scene& scene) {
-  const Eigen::Vector3d& s = *scene.description.bending.rgb;
-  std::vector<Eigen::Vector3d> colors;
-  for (const Band& band : scene.bands) {
-    const Eigen::Vector3d color = to_working(scene) * band.xyz;
-    colors.push_back(color / color.maxCoeff());
+/// Draws what the scene asks for, and the picture has. Lines of text and a legend beside the picture make it larger.
+void draw_annotations(const Scene& scene, const Render& render, double exposure, Image& image) {
+  const OutputDescription& output = scene.description.output;
+  const FieldUnits units = units_of(scene);
+  draw_outline(image, render.outline, output.wants(Annotation::body), output.wants(Annotation::hidden));
+  if (render.view) {
+    const Eigen::Vector3d &right = render.view->right, &up = render.view->up;
+    if (output.wants(Annotation::scale) && render.view->pixel_size)
+      draw_scale_bar(image, *render.view->pixel_size, units.length);
+    if (output.wants(Annotation::axes)) draw_axes(image, right, up);
+    if (units.is_anatomical && (output.wants(Annotation::axes) || output.default_annotations))
+      draw_anatomy(image, right, up, render.draw_legend ? render.legend_room : 0);
   }
-  ColorStrip strip;
-  strip.right = fmt::format("s = {:.3g}, {:.3g}, {:.3g}", s[0], s[1], s[2]);
-  strip.color = [colors](double position) {
-    return colors[std::min(static_cast<std::size_t>(position * static_cast<double>(colors.size())), colors.size() - 1)];
-  };
-  return strip;
+  if (render.draw_legend) {
+    if (render.legend_room == 0) image = with_room_beside(image);
+    render.draw_legend(image, exposure);
+  }
+  for (const std::string& line : {render.legend_note, output.caption})
+    if (!line.empty()) {
+      image = with_room_below(image);
+      draw_caption(image, line);
+    }
 }
 
 /// The value of R, G or B that 99% of the lit pixels of a scene-linear picture do not exceed; nothing if it is black.
@@ -187,7 +184,7 @@ double display_exposure(const Scene& scene, const Render& render) {
 Image display_image(const Scene& scene, const Render& render, bool holds_alpha) {
   if (render.display) {
     Image image = *render.display;
-    draw_annotations(scene.description.output, render, image);
+    draw_annotations(scene, render, 0, image);
     return image;
   }
   const Image& linear = render.linear;
@@ -205,10 +202,7 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha) 
     for (int c = 0; c < 3; ++c) out[c] = gain * in[c] / alpha;
     if (has_alpha) out[3] = in[3];
   }
-  const OutputDescription& output = scene.description.output;
-  draw_outline(image, render.outline, output.wants(Annotation::body), output.wants(Annotation::hidden));
-  if (render.draw_legend) render.draw_legend(image, exposure);
-  draw_annotations(output, render, image);
+  draw_annotations(scene, render, exposure, image);
   scene.color.to_display(image);
   return image;
 }
@@ -226,19 +220,23 @@ PictureView picture_view(const Camera& camera) {
 }
 
 std::function<void(Image&, double)> light_legend(const Scene& scene) {
-  const ColorStrip strip = scene.description.bending.rgb ? rgb_strip(scene) : wavelength_strip(scene);
-  return [strip](Image& image, double exposure) {
-    ColorStrip with_exposure = strip;
-    with_exposure.note = fmt::format("{:+.1f} stops", exposure);
-    draw_color_strip(image, with_exposure);
+  const SceneDescription& description = scene.description;
+  const ValueRange range{description.light.wavelength_min, description.light.wavelength_max};
+  const Eigen::Matrix3d from_rec709 = scene.color.xyz_to_working() * rec709_to_xyz();
+  const auto color = [=](double wavelength) -> Eigen::Vector3d { return from_rec709 * wavelength_color(wavelength); };
+  ColorKey key;
+  for (std::size_t i = 0; description.bending.rgb && i < scene.bands.size(); ++i) {
+    const Eigen::Vector3d light = to_working(scene) * scene.bands[i].xyz;
+    const double flexibility = (*description.bending.rgb)[static_cast<Eigen::Index>(i)];
+    key.entries.push_back({fmt::format("s = {:.3g}", flexibility), light / light.maxCoeff()});
+  }
+  if (!description.bending.rgb && range.low == range.high)
+    key.entries.push_back({fmt::format("{:g} nm", range.low), color(range.low)});
+  return [=](Image& image, double exposure) {
+    const std::string stops = fmt::format("{:+.1f} stops", exposure);
+    if (!key.entries.empty()) return draw_color_key(image, {stops, key.entries});
+    draw_color_bar(image, {"nm\n" + stops, range, [&](double at) { return color(range.value(at)); }});
   };
-}
-
-void draw_annotations(const OutputDescription& output, const Render& render, Image& image) {
-  if (!output.caption.empty()) draw_caption(image, output.caption);
-  if (!render.view) return;
-  if (output.wants(Annotation::scale) && render.view->pixel_size) draw_scale_bar(image, *render.view->pixel_size);
-  if (output.wants(Annotation::axes)) draw_axes(image, render.view->right, render.view->up);
 }
 
 Eigen::Vector3d wavelength_color(double wavelength) {

@@ -46,9 +46,6 @@ PictureView picture_view(const Camera& camera);
 /// A legend of a scene's light, for Render::draw_legend: wavelengths (RGB mode: flexibilities) and exposure.
 std::function<void(Image&, double exposure)> light_legend(const Scene& scene);
 
-/// Draws the caption, the scale bar and the axes that `output` asks for, if the picture has them.
-void draw_annotations(const OutputDescription& output, const Render& render, Image& image);
-
 /// The colour of a wavelength (nm), linear Rec. 709, as saturated as a display can show it; grey if the eye sees none.
 Eigen::Vector3d wavelength_color(double wavelength);
 

@@ -59,7 +59,7 @@ std::string between_voxels(const MadeField& made) {
                                             : "cubic between them, continued into inactive ones";
 }
 
-LoadedField with_notes(MadeField made, const std::string& source) {
+LoadedField with_notes(MadeField made, const std::string& source, FieldUnits units) {
   std::vector<std::string> notes;
   if (made.non_finite > 0)
     notes.push_back(fmt::format("warning: {}: {} of {} voxels are not finite; light goes straight there", source,
@@ -90,10 +90,28 @@ LoadedField with_notes(MadeField made, const std::string& source) {
         fmt::format("preprocessing erased {:.0f}% of the field's squared norm (rotation and shear); "
                     "\"eigenvalues\": \"raw\" keeps it",
                     100 * eigenvalues.norm_lost));
-  return {std::move(*made.field), eigenvalues, made.non_finite, std::move(notes)};
+  return {std::move(*made.field), eigenvalues, made.non_finite, std::move(notes), std::move(units)};
+}
+
+/// @param metadata  Of a file: what an import writes (`--units`, lattice.h).
+FieldUnits units_in(const std::map<std::string, std::string>& metadata) {
+  const auto entry = [&](const char* key) {
+    const auto found = metadata.find(key);
+    return found == metadata.end() ? std::string() : found->second;
+  };
+  return {entry("tensorray:world_unit"), entry("tensorray:units"), entry("tensorray:world_axes") == "RAS"};
 }
 
 }  // namespace
+
+FieldUnits units_of(const Scene& scene) {
+  const SceneDescription& description = scene.description;
+  FieldUnits units = scene.file_units;
+  if (!description.world.unit.empty()) units.length = description.world.unit;
+  if (description.field.derive != Derive::none) units.tensor.clear();  // The file's is that of what is derived.
+  if (!description.field.unit.empty()) units.tensor = description.field.unit;
+  return units;
+}
 
 FieldChoices choices_of(const SceneDescription& description) {
   const FieldDescription& field = description.field;
@@ -119,7 +137,7 @@ LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const
   }
   if (!blocks.surface.triangles.empty()) choices.interpolant.border = choices.at_surface;
   if (choices.smoothing == 0 && !choices.noise)
-    return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source);
+    return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source, units_in(blocks.metadata));
   TensorGrid grid = to_grid(blocks);
   const std::size_t non_finite = remove_non_finite(grid);
   if (choices.noise) keep_noise(grid);
@@ -128,8 +146,12 @@ LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const
   const double kept = before > 0 ? variation(grid) / before : 1;
   MadeField made = make_field(source_of(std::move(grid)), choices.eigenvalues, choices.interpolant);
   made.non_finite += non_finite;
+<<<<<<< HEAD
   if (choices.noise) made.resolution = {};  // Noise is never resolved.
   LoadedField loaded = with_notes(std::move(made), source);
+=======
+  LoadedField loaded = with_notes(std::move(made), source, units_in(blocks.metadata));
+>>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
   if (choices.noise) loaded.notes.push_back("field: its noise alone, in random order, and no structure");
   if (choices.smoothing > 0)
     loaded.notes.push_back(
@@ -158,7 +180,7 @@ std::string field_key(const SceneDescription& description) {
 
 std::optional<LoadedField> field_of(const std::optional<Scene>& before, const SceneDescription& description) {
   if (!before || before->field_key != field_key(description)) return {};
-  LoadedField field{before->field, before->eigenvalues, before->non_finite, {}};
+  LoadedField field{before->field, before->eigenvalues, before->non_finite, {}, before->file_units};
   field.is_known = true;
   field.kept = before->kept;
   return field;

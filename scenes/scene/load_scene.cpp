@@ -323,6 +323,7 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
     note_place(*geometry.surfaces().plate, loaded.field, notes);
   Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(light.color));
   scene.kept = std::move(loaded.kept);
+  scene.file_units = std::move(loaded.units);
   scene.eigenvalues = loaded.eigenvalues;
   scene.non_finite = loaded.non_finite;
   scene.beam = std::move(beam);

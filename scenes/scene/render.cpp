@@ -32,7 +32,7 @@ void warn_of_annotations(const Scene& scene, Render& render) {
     render.warnings.push_back(
         "`/output/annotations`: there are no lines of a body: light on a plate and a lens have them, where the field "
         "has a surface (`/field/bounds`) or there are `/obstacles`");
-  if (output.wants(Annotation::legend) && !render.draw_legend && !render.display)
+  if (output.wants(Annotation::legend) && !render.draw_legend)
     render.warnings.push_back(
         fmt::format("`/output/annotations`: this picture of {} has no colours with a meaning, and gets no legend",
                     scene.description.integrator.method().name()));

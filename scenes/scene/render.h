@@ -74,8 +74,11 @@ struct Render {
   std::function<void(const std::filesystem::path&, const std::vector<Path>& paths)> write_tubes;
   std::vector<OutlineStroke> outline;  ///< Lines of bodies, in pixels of the picture, if annotations want them.
   std::optional<PictureView> view;     ///< Of `linear`; none: there is no picture.
-  /// Draws a legend over a scene-linear picture whose exposure is so many stops; empty: no legend.
+  /// Draws a legend at the right of a scene-linear picture whose exposure is so many stops (of `display`: over it);
+  /// empty: no legend.
   std::function<void(Image&, double exposure)> draw_legend;
+  int legend_room = 0;      ///< Pixels of the picture at the right that are the legend's; 0: it is beside the picture.
+  std::string legend_note;  ///< A line below; may be empty.
   Statistics statistics;
   std::vector<std::string> notes;     ///< What the picture shows, for the user; one line each.
   std::vector<std::string> warnings;  ///< Problems that the picture does not show by itself; one line each.

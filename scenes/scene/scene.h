@@ -25,6 +25,12 @@ namespace tensorray {
 class KeptResults;
 class RayMemory;
 
+/// What the numbers of a field are; empty: not known.
+struct FieldUnits {
+  std::string length, tensor;
+  bool is_anatomical = false;  ///< World space is RAS: x to the right of a patient, y to the front, z to the head.
+};
+
 struct Scene {
   Scene(SceneDescription d, TensorField f, Geometry g, ColorManagement c)
       : description(std::move(d)), field(std::move(f)), geometry(std::move(g)), color(std::move(c)) {}
@@ -50,6 +56,7 @@ struct Scene {
 
   std::shared_ptr<const LoadedMethod> method;  ///< The method that renders the scene.
 
+  FieldUnits file_units;  ///< Of the field's file.
   EigenvalueReport eigenvalues;
   AutoScale scale;
   std::size_t non_finite = 0;      ///< Number of voxels that were not finite and were removed.
@@ -63,9 +70,13 @@ struct LoadedField {
   EigenvalueReport eigenvalues;
   std::size_t non_finite = 0;
   std::vector<std::string> notes;
+  FieldUnits units = {};  ///< Of its file.
   bool is_known = false;  ///< Notes about it, and warnings about the description, were told with an earlier scene.
   std::shared_ptr<KeptResults> kept = nullptr;
 };
+
+/// The units that a scene names, else those of the field's file.
+FieldUnits units_of(const Scene& scene);
 
 /// What is made of a field's voxels.
 struct FieldChoices {

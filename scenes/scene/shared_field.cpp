@@ -24,6 +24,7 @@ struct FieldRest {
   EigenvalueReport eigenvalues;
   std::size_t non_finite = 0;
   std::vector<std::string> notes;
+  FieldUnits units;
 
   void copy(Archive& archive) {
     archive.copy(parts.interpolant);
@@ -48,6 +49,9 @@ struct FieldRest {
     archive.copy(count);
     notes.resize(count);
     for (std::string& note : notes) archive.copy_list(note);
+    archive.copy_list(units.length);
+    archive.copy_list(units.tensor);
+    archive.copy(units.is_anatomical);
   }
 };
 
@@ -82,6 +86,7 @@ bool complete_file(const LoadedField& loaded) {
   rest.eigenvalues = loaded.eigenvalues;
   rest.non_finite = loaded.non_finite;
   rest.notes = loaded.notes;
+  rest.units = loaded.units;
   Archive archive;
   rest.copy(archive);
   std::string bytes = archive.take();
@@ -106,7 +111,8 @@ std::optional<LoadedField> field_of_file(Descriptor file) {
   for (const BrickList& level : rest.parts.levels) count += level.places.size();
   rest.parts.memory = bricks_of_file(std::move(file), count, rest.stride, rest.components);
   rest.notes.emplace_back("the field is that of another process, which has loaded it");
-  return LoadedField{TensorField(std::move(rest.parts)), rest.eigenvalues, rest.non_finite, std::move(rest.notes)};
+  return LoadedField{TensorField(std::move(rest.parts)), rest.eigenvalues, rest.non_finite, std::move(rest.notes),
+                     std::move(rest.units)};
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ TEST(Refusals, OfCharts) {
   refused("range", [] { round_ticks({0, 1, true}, 5); });
   refused("two ticks", [] { round_ticks({0, 1}, 1); });
   refused("R, G, B", [&] { draw_color_bar(grey, {"", {0, 1}, red}); });
-  refused("R, G, B", [&] { draw_color_key(grey, direction_key()); });
+  refused("R, G, B", [&] { draw_color_key(grey, {"", {{"x", {1, 0, 0}}, {"y", {0, 1, 0}}, {"z", {0, 0, 1}}}}); });
   refused("entries", [&] { draw_color_key(image, {"title", {}}); });
   refused("colours", [&] { draw_color_bar(image, {"title", {0, 1}, nullptr}); });
   refused("range", [&] { draw_color_bar(image, {"title", {1, 0}, red}); });

@@ -11,6 +11,8 @@
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "tests/files.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/making/generators.h"
 
 namespace tensorray {
 namespace {
@@ -18,7 +20,7 @@ namespace {
 constexpr int size = 200;  // Pixels along both sides of all pictures.
 
 /// The part of the picture that an annotation is in.
-enum class Part { none, lower_left, upper_left, upper_right, right, changes_nothing };
+enum class Part { none, lower_left, upper_left, beside };
 
 struct MethodCase {
   std::string name, text;
@@ -26,17 +28,17 @@ struct MethodCase {
 };
 
 const std::vector<MethodCase> methods{
-    {"photons", R"({"integrator": {"type": "photon_distribution"}})", Part::lower_left, Part::upper_right},
+    {"photons", R"({"integrator": {"type": "photon_distribution"}})", Part::lower_left, Part::beside},
     {"three colours", R"({"bending": {"rgb": [0.1, 0.2, 0.3]}, "integrator": {"type": "photon_distribution"}})",
-     Part::lower_left, Part::upper_right},
+     Part::lower_left, Part::beside},
     {"lens", R"({"integrator": {"type": "lens"}})", Part::lower_left, Part::none},
     {"stretch", R"({"integrator": {"type": "stretch", "stretch": {"pixels": 200, "resolution": 8}}})", Part::lower_left,
-     Part::changes_nothing},
-    {"paths", R"({"integrator": {"type": "path_tracing"}})", Part::none, Part::right},
+     Part::beside},
+    {"paths", R"({"integrator": {"type": "path_tracing"}})", Part::none, Part::beside},
     {"paths of one colour", R"({"integrator": {"type": "path_tracing", "color": {"by": "none"}}})", Part::none,
      Part::none},
     {"parallel paths", R"({"integrator": {"type": "path_tracing"}, "camera": {"projection": "orthographic"}})",
-     Part::lower_left, Part::right},
+     Part::lower_left, Part::beside},
     {"whole", R"({"integrator": {"type": "scene"}, "lights": [{"kind": "constant"}]})", Part::none, Part::none},
 };
 
@@ -66,28 +68,24 @@ Rendered rendered(const MethodCase& method, const Json& annotations) {
 bool is_within(Part part, int x, int y) {
   switch (part) {
     case Part::lower_left:
-      return 2 * x < size && 4 * y > 3 * size;
+      return 3 * x < 2 * size && 4 * y > 3 * size;
     case Part::upper_left:
       return 2 * x < size && 2 * y < size;
-    case Part::upper_right:
-      return 6 * x > size && 4 * y < size;
-    case Part::right:
-      return 2 * x > size;
     default:
       return false;
   }
 }
 
-/// Expects that two pictures differ within a part of them, and nowhere else.
+/// Expects that two pictures differ within a part of them, or beside the smaller one, and nowhere else.
 void expect_only_within(Part part, const Image& with, const Image& without, const std::string& what) {
   ASSERT_EQ(with.channels, without.channels) << what;
   std::size_t within = 0, elsewhere = 0;
-  for (int y = 0; y < with.height; ++y)
-    for (int x = 0; x < with.width; ++x)
+  for (int y = 0; y < without.height; ++y)
+    for (int x = 0; x < without.width; ++x)
       if (!std::equal(with.pixel(x, y), with.pixel(x, y) + with.channels.size(), without.pixel(x, y)))
         ++(is_within(part, x, y) ? within : elsewhere);
-  const bool is_drawn = part != Part::none && part != Part::changes_nothing;
-  EXPECT_EQ(within > 20, is_drawn) << what;
+  EXPECT_EQ(within > 20, part != Part::none && part != Part::beside) << what;
+  EXPECT_EQ(with.width > without.width, part == Part::beside) << what;
   EXPECT_EQ(elsewhere, 0u) << what;
 }
 
@@ -110,13 +108,17 @@ TEST(Annotations, AreInTheirCornersAndNowhereElse) {
   }
 }
 
-/// Tubes have a legend and a scale bar if nothing is said, where they have a meaning, and no warning.
-TEST(Annotations, OfTubesAreThereByDefault) {
+/// Tubes have a legend and a scale bar if nothing is said, where they have a meaning, and no warning. A camera leaves
+/// room for this legend. Maps of stretch have a legend.
+TEST(Annotations, OfTubesAndStretchAreThereByDefault) {
   for (const MethodCase& method : methods) {
     const Rendered plain = rendered(method, Json::array()), usual = rendered(method, nullptr);
-    const bool has_some = Json::parse(method.text)["integrator"]["type"] == "path_tracing";
-    EXPECT_EQ(usual.display.pixels != plain.display.pixels, has_some) << method.name;
-    EXPECT_EQ(usual.render.linear.pixels, plain.render.linear.pixels) << method.name;
+    const Json type = Json::parse(method.text)["integrator"]["type"];
+    EXPECT_EQ(usual.display.pixels != plain.display.pixels, type == "path_tracing" || type == "stretch") << method.name;
+    EXPECT_EQ(usual.display.width > plain.display.width, type == "stretch") << method.name;
+    EXPECT_EQ(usual.render.linear.pixels != plain.render.linear.pixels,
+              type == "path_tracing" && method.legend == Part::beside)
+        << method.name;
     EXPECT_EQ(usual.render.warnings.size(), plain.render.warnings.size()) << method.name;
   }
 }
@@ -139,6 +141,32 @@ TEST(Annotations, ShowBodies) {
     EXPECT_EQ(visible.render.warnings.size() - plain.render.warnings.size(), has_lines ? 0u : 1u) << method.name;
   }
   EXPECT_THAT(rendered(methods[0], "body").render.warnings.back(), HasSubstr("no lines of a body"));
+}
+
+/// A scene's units are its own, else those of the field's file.
+TEST(Annotations, KnowTheUnitsOfAScene) {
+  const TemporaryFolder folder;
+  TensorGrid grid = generate(Helix{}, default_grid(Helix{}, 9));
+  const auto units = [&](const Json& field, const Json& world) {
+    Json json{{"field", {{"file", (folder / "field.vdb").string()}, {"scale", 1}}},
+              {"world", world},
+              {"integrator", {{"type", "stretch"}}}};
+    json["field"].update(field);
+    return units_of(load_scene(read_scene_json(json, "scene.json"), Progress()));
+  };
+  write_tensor_vdb(folder / "field.vdb", grid);
+  EXPECT_EQ(units(Json::object(), Json::object()).length, "");
+  EXPECT_EQ(units(Json::object(), Json::object()).tensor, "1/length");
+  EXPECT_FALSE(units(Json::object(), Json::object()).is_anatomical);
+  for (const auto& [key, value] : {std::pair("units", "mm^2/s"), {"world_unit", "mm"}, {"world_axes", "RAS"}})
+    grid.metadata[std::string("tensorray:") + key] = value;
+  write_tensor_vdb(folder / "field.vdb", grid);
+  EXPECT_EQ(units(Json::object(), Json::object()).length, "mm");
+  EXPECT_EQ(units(Json::object(), Json::object()).tensor, "mm^2/s");
+  EXPECT_TRUE(units(Json::object(), {{"up", "y"}}).is_anatomical);
+  EXPECT_EQ(units({{"unit", "MPa"}}, {{"unit", "in"}}).tensor, "MPa");
+  EXPECT_EQ(units({{"derive", "viscous_stress"}}, {{"unit", "in"}}).tensor, "");
+  EXPECT_EQ(units({{"unit", "MPa"}}, {{"unit", "in"}}).length, "in");
 }
 
 /// Pixels of a plate have its size / resolution, those of an orthographic camera its height / resolution.

@@ -30,9 +30,10 @@ namespace {
 
 constexpr std::array<double, 3> factors{0.5, 1, 2};  // Of the strength; one row each.
 /// Small pictures of photons: quick, however chaotic the light is.
-const std::vector<std::string> quick{"integrator.density={\"kind\":\"gaussian\",\"tau\":1}", "light.photons=20480",
+const std::vector<std::string> quick{"integrator.density={\"kind\":\"gaussian\",\"tau\":1}",
                                      "light.wavelengths.count=16", "light.wavelengths.per_photon=4"};
-constexpr std::size_t quick_in_one_color = 2;  // The first of them.
+constexpr std::size_t quick_in_one_color = 1;  // The first of them.
+constexpr double photons_per_pixel = 2.5;      // Undisturbed light then has 2% of noise.
 constexpr int gap = 8;                         // Pixels about the pictures.
 
 constexpr std::size_t columns = 6;  // Directions of the light.
@@ -171,9 +172,11 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
       const LightDescription& light = scene->description.light;
       if (light.wavelength_min == light.wavelength_max) changes.resize(quick_in_one_color);
       changes.insert(changes.end(),
-                     {direction, scaled, pixels, fmt::format("camera.resolution=[{0},{0}]", options.size),
+                     {direction, scaled, pixels,
+                      fmt::format("light.photons={:.0f}", photons_per_pixel * options.size * options.size),
+                      fmt::format("camera.resolution=[{0},{0}]", options.size),
                       fmt::format("integrator.stretch.pixels={}", options.size)});
-      if (scene->description.output.default_annotations) changes.emplace_back("output.annotations=[]");  // No room.
+      changes.emplace_back("output.annotations=[]");  // No room.
       SceneDescription cell = with(options, changes);
       cell.judges_scale = false;
       load(cell);

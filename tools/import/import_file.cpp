@@ -33,6 +33,7 @@
 #include "tools/import/surfaces/mesh_boundary.h"
 #include "tools/import/surfaces/triangle_shells.h"
 #include "tools/import/vtk_formats/image_lattice.h"
+#include "tools/import/vtk_source/mesh_formats.h"
 #include "tools/import/vtk_source/vtk_source.h"
 #include "volumes/tensors/eigenvalues.h"
 
@@ -169,6 +170,7 @@ TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings
   if (settings.sampling.bounds) crop(grid, *settings.sampling.bounds);
   if (!settings.mask.empty()) apply_mask(grid, settings, report);
   grid.metadata["tensorray:voxels"] = fmt::format("{} {} {}", lattice.size.x(), lattice.size.y(), lattice.size.z());
+  if (lattice.is_anatomical) grid.metadata.insert({{"tensorray:world_unit", "mm"}, {"tensorray:world_axes", "RAS"}});
   grid.name = lattice.array;
   report.lattice->active = grid.active_voxels();
   warn_of_fills(report.lattice->fills, report.lattice->voxels, report);
@@ -348,7 +350,9 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
   if (!open) {
     const auto data = read_vtk_source(file, settings.step, &report.notes);
-    return import_data_set(data, settings, progress, report);
+    TensorGrid grid = import_data_set(data, settings, progress, report);
+    if (&find_format(file) == format_with_ending(".foam")) grid.metadata["tensorray:world_unit"] = "m";
+    return grid;
   }
   if (open == open_npy) return import_lattice(placed(open(file, false), settings), settings, report);
   if (wants_sampling(settings))

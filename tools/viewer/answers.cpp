@@ -272,7 +272,8 @@ Json describe_pixel(const Render& render, const Image& display, const Vector2d& 
   for (const int wanted : {0, 1, 2})
     for (std::size_t i = 3; i < linear.channels.size(); ++i)
       if (rank(linear.channels[i]) == wanted) lines.push_back({linear.channels[i], fmt::format("{:.4g}", pixel[i])});
-  const float* const shown = pixel_at(display, place);
+  const float* const shown =
+      pixel_at(display, {place.x() * linear.width / display.width, place.y() * linear.height / display.height});
   return {{"lines", std::move(lines)},
           {"color", hex(Vector3d(shown[0], shown[1], shown[2]))},
           {"spectrum", spectrum_at(render, place)}};

@@ -45,7 +45,8 @@ class LandedRays {
 };
 
 /// The values of a pixel: `lines`, `color` and `spectrum`.
-/// @param display  The picture as the page shows it. @param place  Part of width and height, from the top left corner.
+/// @param display  The picture as the page shows it: as large as the render's, or larger. @param place  Part of the
+/// render's width and height, from the top left corner.
 Json describe_pixel(const Render& render, const Image& display, const Eigen::Vector2d& place);
 
 }  // namespace tensorray

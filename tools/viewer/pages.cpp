@@ -367,8 +367,10 @@ void Pages::answer(const PagePointer& pointer, const Request& request) {
 }
 
 void Pages::look(Page& page, const Json& message) {
-  const Eigen::Vector2d place(number(message, "x"), number(message, "y"));
   if (!page.render || page.display.pixels.empty()) throw std::invalid_argument("there is no picture yet");
+  const Image &picture = page.render->linear, &shown = page.display;  // Which may have a legend beside the picture.
+  const Eigen::Vector2d place(number(message, "x") * shown.width / picture.width,
+                              number(message, "y") * shown.height / picture.height);
   const Scene& scene = live_.scene();
   Json content = describe_pixel(*page.render, page.display, place);
   content["rays"] = Json::array();

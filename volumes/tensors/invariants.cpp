@@ -68,11 +68,6 @@ const Definition definitions[] = {
     {"asymmetry", asymmetry, 0},
 };
 
-std::string units_of_power(const std::string& units, int degree) {
-  if (degree == 1 || units.empty()) return units;
-  return degree == 0 ? "1" : "(" + units + ")^" + std::to_string(degree);
-}
-
 }  // namespace
 
 const std::vector<std::string>& invariant_names() {
@@ -98,6 +93,11 @@ double invariant(Invariant which, const Matrix3d& tensor) {
   double value = definition.value(tensor / largest);  // Scaled: squares and cubes neither overflow nor underflow.
   for (int i = 0; i < definition.degree; ++i) value *= largest;
   return std::clamp(value, std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max());
+}
+
+std::string units_of_power(const std::string& units, int degree) {
+  if (degree == 1 || units.empty()) return units;
+  return degree == 0 ? "1" : "(" + units + ")^" + std::to_string(degree);
 }
 
 int invariant_degree(Invariant which) { return definitions[static_cast<std::size_t>(which)].degree; }

@@ -47,6 +47,9 @@ double invariant(Invariant which, const Eigen::Matrix3d& tensor);
 /// to that power.
 int invariant_degree(Invariant which);
 
+/// The unit of a tensor to the power of that degree; "1" of a ratio; empty: not known.
+std::string units_of_power(const std::string& units, int degree);
+
 /// The invariant at every active voxel of a field, which must be finite (see remove_non_finite). The name of the result
 /// is the invariant's. Values beyond the range of single precision become the nearest finite float. Metadata are copied
 /// from the field, and `tensorray:units`, if present, becomes the unit of the invariant. Runs on all threads.

@@ -101,6 +101,7 @@ TEST(Nifti, BrainHasItsFacts) {
   SKIP_WITHOUT(path);
   const Lattice lattice = open_nifti(path);
   EXPECT_EQ(lattice.size, Vector3i(96, 96, 50));
+  EXPECT_TRUE(lattice.is_anatomical);
   EXPECT_LT(lattice.to_world.linear().determinant(), 0);
   EXPECT_NEAR(lattice.to_world.linear().col(1).norm(), 2.5, 0.01);
   EXPECT_NEAR(lattice.to_world.translation().x(), 121.264, 1e-3);

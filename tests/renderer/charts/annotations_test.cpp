@@ -36,9 +36,9 @@ TEST(AnnotationsTest, RoundLengthsAreTheGreatestThatFit) {
 TEST(AnnotationsTest, ScaleBarHasItsLength) {
   for (const float ground : {0.0f, 1.0f})
     for (const double pixel_size : {0.013, 0.0049, 1.0, 3.3e-9, 7e20}) {
-      const int width = 300, height = 200, margin = 11;
+      const int width = 300, height = 200, margin = 13;
       Image image = blank(width, height, ground);
-      draw_scale_bar(image, pixel_size);
+      draw_scale_bar(image, pixel_size, "mm");
       double ink = 0;
       for (int x = 0; x < width; ++x) ink += std::abs(image.pixel(x, height - margin - 1)[0] - ground);
       const double length = round_length(0.4 * height * pixel_size);
@@ -56,7 +56,7 @@ TEST(AnnotationsTest, CaptionIsInTheLowerRightCorner) {
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
       if (image.pixel(x, y)[0] > 0.5f) ink.extend(Eigen::Vector2i(x, y));
-  const double letter = 11;
+  const double letter = 13;
   EXPECT_NEAR(ink.max().x(), 300 - letter, 3);
   EXPECT_NEAR(ink.max().y(), 200 - letter, 2);
   EXPECT_NEAR(ink.min().x(), 300 - letter - text_width("scale 7", letter), 3);
@@ -76,29 +76,44 @@ TEST(AnnotationsTest, AxesPointAsThePictureShowsThem) {
   EXPECT_NE(extent({1, 0, 0}, {0, 1, 0}).pixels, extent({-1, 0, 0}, {0, 1, 0}).pixels);
   // x has 3 letters and a half, and y as much; the letter of z is left and below of the origin.
   const Eigen::AlignedBox2i flat = drawn_box(extent({1, 0, 0}, {0, 1, 0}), 0);
-  EXPECT_NEAR(flat.sizes().x(), (3 + 0.9 + 0.9) * 11, 11);
-  EXPECT_NEAR(flat.sizes().y(), (3 + 0.9 + 0.9) * 11, 11);
-  EXPECT_EQ(flat.min().x(), 11);
-  EXPECT_NEAR(flat.min().y(), 11, 3);  // Small letters are lower than capital ones, for which there is room.
+  EXPECT_NEAR(flat.sizes().x(), (3 + 0.9 + 0.9) * 13, 13);
+  EXPECT_NEAR(flat.sizes().y(), (3 + 0.9 + 0.9) * 13, 13);
+  EXPECT_EQ(flat.min().x(), 13);
+  EXPECT_NEAR(flat.min().y(), 13, 3);  // Small letters are lower than capital ones, for which there is room.
   // Seen along the diagonal, all three are lines.
   const Eigen::Vector3d view = Eigen::Vector3d(-1, -1, -1).normalized();
   const Eigen::Vector3d right = view.cross(Eigen::Vector3d::UnitZ()).normalized();
   EXPECT_FALSE(drawn_box(extent(right, right.cross(view)), 0).isEmpty());
 }
 
-TEST(AnnotationsTest, StripShowsItsColors) {
-  Image image = blank(500, 300, 0);
-  draw_color_strip(image, {"380", "730 nm", [](double at) { return Eigen::Vector3d(at, 0.25, 1 - at); }, "+1.0 stops"});
-  std::vector<float> reds;
-  for (int x = 0; x < 500; ++x) {
-    const float* const pixel = image.pixel(x, 11 + 5);
-    if (pixel[1] == 0.25f && std::abs(pixel[0] + pixel[2] - 1) < 1e-6f) reds.push_back(pixel[0]);
+/// Legends with short words, one or two, are beside the picture and cover none of it. The room is even.
+TEST(AnnotationsTest, RoomIsForALegendAndLeavesThePicture) {
+  for (const auto& [width, height] : {std::pair(200, 200), {512, 512}, {200, 900}, {1920, 1080}, {24, 16}}) {
+    Image image = blank(width, height, 0.6f);
+    const Image with_room = with_room_beside(image);
+    Image wide = with_room;
+    for (const std::size_t part : {0, 1})
+      draw_color_bar(wide, {"largest\n1/mm", {0, 0.0123}, [](double) { return Eigen::Vector3d(1, 0, 0); }}, {part, 2});
+    wide = with_room_below(wide);
+    draw_caption(wide, "a line that is longer than most, which is why its letters are smaller than they would be");
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) ASSERT_EQ(wide.pixel(x, y)[0], 0.6f) << width << ": " << x << ", " << y;
+    EXPECT_EQ((wide.width - width) % 2 + (wide.height - height) % 2, 0);
+    EXPECT_EQ(with_room.pixel(width, 0)[0], 1);
   }
-  ASSERT_EQ(reds.size(), 100u);  // A fifth of the width.
-  for (std::size_t i = 0; i < reds.size(); ++i) EXPECT_NEAR(reds[i], (static_cast<double>(i) + 0.5) / 100, 1e-6);
 }
 
-/// Dashes of 5.5 pixels, which go on from stroke to stroke.
+TEST(AnnotationsTest, DirectionsOfAPatientHaveTheirLetters) {
+  const std::vector<std::pair<Eigen::Vector3d, std::string>> cases{
+      {{1, 0, 0}, "R"},       {{-1, 0, 0}, "L"},
+      {{0, 1, 0}, "A"},       {{0, -1, 0}, "P"},
+      {{0, 0, 1}, "S"},       {{0, 0, -1}, "I"},
+      {{0.3, 0, 0.954}, "S"}, {{0.6, 0, -0.8}, "IR"},
+      {{-0.8, 0.6, 0}, "LA"}, {{-0.66, -0.57, 0.49}, "LPS"}};
+  for (const auto& [direction, letters] : cases) EXPECT_EQ(anatomical_letters(direction), letters);
+}
+
+/// Dashes of 6.5 pixels, which go on from stroke to stroke.
 TEST(AnnotationsTest, HiddenLinesAreDashed) {
   for (const bool hidden : {false, true}) {
     Image image = blank(300, 200, 1);
@@ -165,7 +180,7 @@ TEST(ColorBarTest, ShowsAllPositionsFromTheBottomToTheTop) {
     ASSERT_FALSE(pixels.empty());
     const int top = pixels.front().y(), bottom = pixels.back().y();
     EXPECT_NEAR(bottom - top + 1, 0.6 * size, 1);
-    EXPECT_NEAR(top + bottom, size, 0.1 * size);  // The bar is vertically centred.
+    EXPECT_NEAR(top + bottom, size, 0.15 * size);  // The bar is vertically centred, below its title.
     EXPECT_GT(pixels.front().x(), image.width * 0.75);
     for (const Eigen::Vector2i& p : pixels)
       EXPECT_NEAR(image.pixel(p.x(), p.y())[1], (bottom + 0.5 - p.y()) / (bottom - top + 1), 1e-6);
@@ -196,14 +211,14 @@ TEST(ColorBarTest, IsCutOffWhereThePictureIsSmall) {
   for (const int size : {1, 7, 40}) {
     Image image = plain(size, size, 0.5f);
     draw_color_bar(image, green_bar());
-    draw_color_key(image, direction_key());
+    draw_color_key(image, {"", {{"x", {1, 0, 0}}, {"y", {0, 1, 0}}, {"z", {0, 0, 1}}}});
     for (const float value : image.pixels) EXPECT_TRUE(value >= 0 && value <= 1);
   }
 }
 
 TEST(ColorKeyTest, ShowsEachColorOnceFromTheTop) {
   Image image = plain(400, 400, 0);
-  draw_color_key(image, direction_key());
+  draw_color_key(image, {"", {{"x", {1, 0, 0}}, {"y", {0, 1, 0}}, {"z", {0, 0, 1}}}});
   std::vector<int> rows[3];
   for (int y = 0; y < 400; ++y)
     for (int x = 0; x < 400; ++x)

@@ -75,9 +75,12 @@ TEST_F(Polariscope, ChannelsAreRetardanceAndDirections) {
 
 TEST_F(Polariscope, UnitsOfLengthAndOfStressCancel) {
   const Image expected = render({"integrator.stress_optic=3e-14"});
-  const Image found = render({"integrator.stress_optic=3e-11", "integrator.unit_length=0.001"});
-  for (std::size_t i = 0; i < expected.pixels.size(); ++i)
-    EXPECT_NEAR(found.pixels[i], expected.pixels[i], 1e-5 * (1 + std::abs(expected.pixels[i])));
+  for (const char* unit : {"integrator.unit_length=0.001", "world.unit=mm"}) {
+    const Image found =
+        render({"integrator.stress_optic=3e-11", unit, unit[0] == 'w' ? "integrator.unit_length=null" : unit});
+    for (std::size_t i = 0; i < expected.pixels.size(); ++i)
+      EXPECT_NEAR(found.pixels[i], expected.pixels[i], 1e-5 * (1 + std::abs(expected.pixels[i])));
+  }
 }
 
 TEST_F(Polariscope, AutomaticCoefficientGivesFourOrders) {
@@ -185,10 +188,12 @@ TEST_F(Polariscope, StokesParametersAreChannelsOfTheSpectralPicture) {
 TEST_F(Polariscope, ALegendHasTheInterferenceColours) {
   for (const char* arrangement : {"circular", "tint", "plane"}) {
     const Settings settings{std::string("integrator.arrangement=") + arrangement, "receiver.resolution=[300,300]"};
-    const SceneChanges changes{{settings[0], settings[1], "output.annotations=legend"}, {}};
+    const SceneChanges changes{{settings[0], settings[1], "output.annotations=legend", "field.unit=Pa", "world.unit=m"},
+                               {}};
     const Scene scene = load_scene(read_scene(in_folder("scene.json"), changes), Progress());
     const Render seen = tensorray::render(scene, Progress());
     ASSERT_TRUE(seen.draw_legend);
+    EXPECT_EQ(seen.legend_note, "1 order: 545 nm, 5.45e+06 Pa m") << arrangement;
     Image with = seen.linear;
     seen.draw_legend(with, 0);
     int changed = 0;

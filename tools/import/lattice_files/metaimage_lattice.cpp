@@ -109,7 +109,7 @@ Lattice open_metaimage(const Path& path, bool is_mask) {
   if (lattice.components == 6) lattice.usual_order = TensorOrder::fsl;  // itk::SymmetricSecondRankTensor
   lattice.to_world = Vector3d(-1, -1, 1).asDiagonal() * to_lps(header);
   lattice.frame = axes_of(ComponentFrame::lps, lattice.to_world.linear());
-  lattice.takes_frame = lattice.zero_is_background = true;
+  lattice.is_anatomical = lattice.takes_frame = lattice.zero_is_background = true;
   lattice.frame_note = "does not say the axes of its components: taken as ITK's (LPS); --frame says otherwise";
 
   RawVoxels voxels;

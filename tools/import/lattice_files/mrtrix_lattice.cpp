@@ -128,7 +128,7 @@ Lattice open_mrtrix(const Path& path, bool is_mask) {
   lattice.components = static_cast<int>(extents[3]);
   if (lattice.components == 6) lattice.usual_order = TensorOrder::mrtrix;
   lattice.to_world = to_world(header, lattice.size);
-  lattice.order_tells_frame = lattice.takes_frame = lattice.zero_is_background = true;
+  lattice.is_anatomical = lattice.order_tells_frame = lattice.takes_frame = lattice.zero_is_background = true;
   RawVoxels voxels;
   set_type(header, voxels);
   set_layout(header, extents, voxels);

@@ -163,6 +163,7 @@ Lattice open_nifti(const std::filesystem::path& given, bool is_mask) {
       fail(path, "its NIfTI header is damaged: sizes");
   lattice.size = {static_cast<int>(image->nx), static_cast<int>(image->ny), static_cast<int>(image->nz)};
   lattice.to_world = to_world(*image, path);
+  lattice.is_anatomical = has_orientation(*image);
   lattice.order_tells_frame = lattice.takes_frame = lattice.zero_is_background = true;
   if (!has_orientation(*image))
     lattice.notes.push_back(

@@ -210,6 +210,8 @@ Lattice open_nrrd(const std::filesystem::path& path, bool is_mask) {
   lattice.order = components.order;
   lattice.to_world = to_world(*nrrd, axes, path);
   lattice.frame = frame_of(*nrrd, path);
+  const char* const unit = nrrd->spaceUnits[0];
+  lattice.is_anatomical = is_anatomical(*nrrd) && (!unit || std::string(unit) == "mm");
   lattice.takes_frame = is_anatomical(*nrrd) && !has_frame(*nrrd);
   if (lattice.takes_frame)
     lattice.frame_note =

@@ -46,6 +46,7 @@ struct Lattice {
   std::string frame_note;    ///< Where the file leaves `frame` open: how it was taken, for the user.
   bool takes_frame = false;  ///< World is RAS and the file does not state `frame`: the user may (take_frame).
 
+  bool is_anatomical = false;        ///< World is RAS in millimetres, as the file says.
   std::string array;                 ///< Name of the quantity; may be empty.
   int components = 0;                ///< Numbers per voxel, including the mask.
   bool masked = false;               ///< The first component is a mask: the voxel is inactive where it is below 0.5.
