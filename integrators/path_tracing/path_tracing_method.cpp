@@ -245,10 +245,7 @@ void PathTracingMethod::check(SceneDescription& scene, const Json& json, const S
   if (paths.radius.min && paths.radius.max && *paths.radius.min > *paths.radius.max)
     source.fail("`/integrator/radius`: `min` must not exceed `max`");
   if (!chosen) return;
-  if (!given(json, "/output/annotations")) {
-    scene.output.annotations = {Annotation::scale, Annotation::legend};
-    scene.output.default_annotations = true;
-  }
+  default_annotations(scene, json, {Annotation::scale, Annotation::legend});
   if (scene.bending.settings.max_steps > 1'000'000)
     source.fail("`/bending/max_steps` must be at most 1e6 with path_tracing, which keeps every step of a path");
   check_memory(scene.camera.resolution.cast<double>().prod() *

@@ -76,6 +76,8 @@ struct Render {
   std::optional<PictureView> view;     ///< Of `linear`; none: there is no picture.
   /// Draws a legend over a scene-linear picture whose exposure is so many stops; empty: no legend.
   std::function<void(Image&, double exposure)> draw_legend;
+  /// Whether a pixel of `linear` is hatched, as far as it is transparent; empty: none is.
+  std::function<bool(const float* pixel)> is_hatched;
   Statistics statistics;
   std::vector<std::string> notes;     ///< What the picture shows, for the user; one line each.
   std::vector<std::string> warnings;  ///< Problems that the picture does not show by itself; one line each.
