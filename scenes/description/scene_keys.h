@@ -103,7 +103,6 @@ inline void describe(LightDescription& light, KeyVisitor& visit) {
         knob().with_examples({"D65", "E", "A", "blackbody 3000", "blackbody 5500", "blackbody 9000"}));
   visit.section("wavelengths", WavelengthKeys{light}, "the bands of light that are traced");
   visit("irradiance", light.irradiance, "irradiance of the undisturbed beam, W per world unit squared", above(0));
-  visit.exclude("aperture", {"beam"});
   visit("beam", light.beam,
         "plate: undisturbed light is all around the volume, on all of the plate; volume: light goes only through the "
         "volume, and the plate is 1.25 times as large",
