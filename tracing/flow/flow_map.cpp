@@ -526,8 +526,9 @@ int band_count(const FlowMap& map, int channels, const BandStep& step) {
       if (map.ends[at] == RayEnd::plate && map.ends[at - 1] == RayEnd::plate)
         sweep += (map.landings[at] - map.landings[at - 1]).norm();
     }
-    sweeps.push_back(sweep);
+    if (sweep > 0) sweeps.push_back(sweep);  // Straight light does not count.
   }
+  if (sweeps.empty()) sweeps.push_back(0);
   const auto place = static_cast<std::ptrdiff_t>(swept_share * static_cast<double>(sweeps.size() - 1));
   std::nth_element(sweeps.begin(), sweeps.begin() + place, sweeps.end());
   const double wanted = std::max<double>(step.least, sweeps[static_cast<std::size_t>(place)] / step.pixels);
