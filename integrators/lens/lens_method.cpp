@@ -225,7 +225,9 @@ Render LoadedLens::render_of(const Scene& scene, LensPictures all) const {
   result.statistics.positions = result.statistics.emitted[reference_channel(scene)];
   result.metadata["tensorray:end"] = end_codes();
   result.view = picture_view(lens_.receiver);
-  result.exposure = 0;  // Shows the colours of the image unchanged.
+  result.exposure = 0;                        // Shows the colours of the image unchanged.
+  if (settings_.empty == EmptyLook::hatched)  // All channels are 0 in the gaps between pictures.
+    result.is_hatched = [end = result.linear.channels.size() - 1](const float* pixel) { return pixel[end] != 0; };
   if (nothing_arrived(result.statistics))
     result.warnings.push_back("no ray met the image; check `receiver` and `integrator.image_plane`");
   return result;
@@ -274,6 +276,7 @@ class LensMethod : public MethodWith<LensDescription> {
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
     check_normal(settings().plane.normal, "/integrator/image_plane", scene.light, source);
     if (!chosen) return;
+    default_annotations(scene, json, {Annotation::body});
     check_spectral_output(scene, source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
     // While a depth is drawn: its points, films of colours and alpha, the picture and its colours, and the flow map; of

@@ -37,6 +37,9 @@ enum class Overlay { none, grid };
 /// How the picture shows obstacles, where no light of the image arrives.
 enum class ObstacleLook { hidden, shaded };
 
+/// How the picture shows places that no light of the image reaches.
+enum class EmptyLook { hatched, transparent };
+
 struct LensDescription {
   LensMode mode = LensMode::scatter;
   std::variant<TestImage, std::filesystem::path> image = TestImage::checkerboard;
@@ -47,11 +50,13 @@ struct LensDescription {
   int samples = 1;  ///< Samples per pixel along x and along y.
   Overlay overlay = Overlay::none;
   ObstacleLook obstacles = ObstacleLook::hidden;
+  EmptyLook empty = EmptyLook::hatched;
 };
 
 inline Words words(LensMode) { return {"gather", "scatter"}; }
 inline Words words(Wrap) { return {"none", "clamp", "repeat", "mirror"}; }
 inline Words words(Overlay) { return {"none", "grid"}; }
+inline Words words(EmptyLook) { return {"hatched", "transparent"}; }
 inline Words words(ObstacleLook) { return {"hidden", "shaded"}; }
 
 /// Names of the built-in images for `integrator.image`.
@@ -85,6 +90,7 @@ inline void describe(LensDescription& lens, KeyVisitor& visit) {
   visit("samples", lens.samples, "lens, polariscope: samples of a pixel along x and along y", between(1, 16));
   visit("overlay", lens.overlay, "lens: grid draws straight and distorted grid lines over the picture", knob());
   visit("obstacles", lens.obstacles, "lens: shaded draws the obstacles where no light of the image arrives");
+  visit("empty", lens.empty, "lens: how `image` shows places that no light of the image reaches");
 }
 
 std::shared_ptr<Method> lens_method();

@@ -24,6 +24,7 @@ struct MeshJob {
   const Scene& scene;
   Job* const job;  // Null: nobody else wants anything of it.
   const ShowLight& show;
+  const Beam beam = beam_on_plate(scene);
   Ranks* const ranks = job ? job->ranks : nullptr;
   const bool is_shard = job && job->is_shard;
 
@@ -55,15 +56,16 @@ std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const 
 }
 
 /// Power by channel and end, for a beam of irradiance 1.
-std::vector<std::array<double, ray_end_count>> landed_power(const Scene& scene, const Caustic& caustic) {
+std::vector<std::array<double, ray_end_count>> landed_power(const Scene& scene, double area, const Caustic& caustic) {
   std::vector<std::array<double, ray_end_count>> power = caustic.power;
   for (std::size_t channel = 0; channel < power.size(); ++channel)
-    for (double& each : power[channel]) each *= scene.channels[channel].power * area(scene.beam.aperture);
+    for (double& each : power[channel]) each *= scene.channels[channel].power * area;
   return power;
 }
 
-PlateLight draw(const Scene& scene, FlowMap map, const Sweep& sweep, Ranks* ranks, const Progress& progress) {
+PlateLight draw(const MeshJob& job, FlowMap map, const Sweep& sweep, Ranks* ranks, const Progress& progress) {
   const auto start = Clock::now();
+  const Scene& scene = job.scene;
   PlateLight light;
   light.map = std::move(map);
   const CausticSettings settings{scene.bands.size(), scene.description.output.wants("spectral"), sweep.step, ranks};
@@ -76,8 +78,9 @@ PlateLight draw(const Scene& scene, FlowMap map, const Sweep& sweep, Ranks* rank
   statistics.positions = light.map.starts.size();
   statistics.emitted.assign(scene.channels.size(), light.map.starts.size());
   statistics.ends = caustic.ends;
-  statistics.power = landed_power(scene, caustic);
-  for (const LightChannel& channel : scene.channels) statistics.beam_power += channel.power * area(scene.beam.aperture);
+  const double beam_area = area(job.beam.aperture);
+  statistics.power = landed_power(scene, beam_area, caustic);
+  for (const LightChannel& channel : scene.channels) statistics.beam_power += channel.power * beam_area;
   statistics.ray_steps = light.map.ray_steps;
   statistics.tensor_samples = light.map.tensor_samples;
   gather_counts(ranks, statistics);
@@ -92,22 +95,22 @@ FlowMap trace(const MeshJob& job, double tolerance, const Progress& progress) {
   const LightRange range = light_range(scene);
   settings.flexibilities = range.flexibilities;
   settings.range = range.is_range;
-  settings.side_light = scene.description.integrator.settings<PhotonDescription>().side_light;
+  settings.side_light = keeps_side_light(scene);
   settings.memory = scene.rays;
   settings.job = job.job;
   settings.is_kept = true;
   if (job.show)
     settings.show = [&](const std::function<FlowMap()>& so_far) {
-      if (job.is_shown()) job.show(draw(scene, so_far(), {}, nullptr, progress));
+      if (job.is_shown()) job.show(draw(job, so_far(), {}, nullptr, progress));
     };
-  return trace_flow_map(scene.field, scene.geometry, scene.beam, scene.bending, settings, progress);
+  return trace_flow_map(scene.field, scene.geometry, job.beam, scene.bending, settings, progress);
 }
 
 PlateLight trace_and_draw(const MeshJob& job, double tolerance, const Sweep& sweep, const Progress& progress) {
   const auto start = Clock::now();
   FlowMap map = trace(job, tolerance, progress);
   const double seconds = seconds_since(start);
-  PlateLight light = draw(job.scene, std::move(map), sweep, job.ranks, progress);
+  PlateLight light = draw(job, std::move(map), sweep, job.ranks, progress);
   light.render.statistics.seconds_tracing = seconds;
   return light;
 }

@@ -1,6 +1,7 @@
 #include "integrators/photon_distribution/photon_distribution.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -11,8 +12,9 @@
 namespace tensorray {
 namespace {
 
-constexpr double min_interval = 0.2;          // Seconds between states that are kept.
-constexpr double tracing_for_keeping = 20;    // Tracing takes so many times longer than keeping.
+constexpr double min_interval = 0.2;        // Seconds between states that are kept.
+constexpr double tracing_for_keeping = 20;  // Tracing takes so many times longer than keeping.
+constexpr double most_wider = 4;            // Photons for light beside the core, at most, as a factor on their number.
 constexpr std::uint64_t chunks_in_round = 2;  // That each rank traces before it hears from the others.
 
 int rays_per_position(const std::vector<LightChannel>& channels, const PhotonSettings& settings) {
@@ -158,7 +160,10 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
                                       const Progress& progress) {
   if (!geometry.surfaces().plate) throw std::invalid_argument("photon distribution needs a receiver");
   const int rays = rays_per_position(channels, settings);
-  const BeamSampler positions(beam, settings.pattern, settings.photons, settings.seed);
+  // Where light is bent, there are as many as in a beam without light beside it.
+  const double wider = std::min(area(beam.aperture) / area(core_of(beam)), most_wider);
+  const auto photons = static_cast<std::uint64_t>(std::llround(wider * static_cast<double>(settings.photons)));
+  const BeamSampler positions(beam, settings.pattern, photons, settings.seed);
   // The references first; each has a different type, so that they cannot be confused.
   PhotonJob job{field, geometry, beam, channels, settings, progress, positions, PixelMap(*geometry.surfaces().plate)};
   if (!settings.side_light) job.sides.emplace(field, beam.direction);

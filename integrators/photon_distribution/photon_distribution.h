@@ -24,7 +24,7 @@ struct PhotonDistribution;
 
 struct PhotonSettings {
   BendingSettings bending;
-  std::uint64_t photons = 1u << 20;  ///< Approximate number of positions that emit; > 0.
+  std::uint64_t photons = 1u << 20;  ///< Approximate number of positions that emit, in the core of the beam; > 0.
   BeamPattern pattern = BeamPattern::stratified;
 
   /// Number of channels that each position carries, stratified; a divisor of the number of channels; 0: all.

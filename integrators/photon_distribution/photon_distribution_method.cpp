@@ -92,7 +92,7 @@ Render render_of(const Scene& scene, PlateLight light, const Progress& progress,
   result.metadata["tensorray:photons"] = std::to_string(result.statistics.positions);
   result.statistics.seconds_color = seconds_since(start);
   if (const double share = side_share(result.statistics); share > 0)
-    result.warnings.push_back(
+    result.notes.push_back(
         fmt::format("{:.2g}% of the light leaves the volume by its side faces and is left out "
                     "(`integrator.side_light`)",
                     100 * share));
@@ -173,6 +173,7 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
     if (!chosen && given(json, "/integrator/density/error"))
       scene.warnings.push_back("`/integrator/density/error` bounds only the error of the light on a plate");
     if (!chosen) return;
+    default_annotations(scene, json, {Annotation::body});
     check_spectral_output(scene, source);
     check_receiver_memory(scene, static_cast<double>(bytes_per_pixel(scene, settings().density.kind)), source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");

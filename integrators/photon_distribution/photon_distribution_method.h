@@ -28,7 +28,7 @@ struct PhotonDensity {
 
 struct PhotonDescription {
   PhotonDensity density;
-  bool side_light = true;  ///< Whether light that leaves the volume by its side faces falls on the plate.
+  std::optional<bool> side_light;  ///< Whether light that leaves the volume by its side faces falls on the plate.
 };
 
 inline Words words(PhotonDensityKind) { return {"mesh", "gaussian", "histogram", "photon_differential"}; }
@@ -55,7 +55,8 @@ inline void describe(PhotonDensity& density, KeyVisitor& visit) {
 inline void describe(PhotonDescription& photons, KeyVisitor& visit) {
   visit.section("density", photons.density, "photon_distribution: estimation of irradiance on the plate");
   visit("side_light", photons.side_light,
-        "photon_distribution: whether light that leaves the volume by its side faces falls on the plate");
+        "photon_distribution: whether light that leaves the volume by its side faces falls on the plate; default: with "
+        "the beam `volume`, an aperture, or a field that ends at the surface of a body");
 }
 
 std::shared_ptr<Method> photon_distribution_method();

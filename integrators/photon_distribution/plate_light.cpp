@@ -18,6 +18,9 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+constexpr double plate_margin = 1.0 / 16;  // Light beside the plate, as a part of its longer side.
+constexpr double widest_gaussian = 4;      // Radius of a photon, in standard deviations.
+
 /// Whether photons are collected as red, green and blue. Up to three bands need no more planes, and cost less.
 bool is_collected_in_color(const Scene& scene) {
   return !scene.description.output.wants("spectral") && scene.bands.size() > 3;
@@ -32,7 +35,7 @@ PhotonSettings photon_settings(const Scene& scene, Job* job) {
   settings.pattern = description.light.pattern;
   settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
   settings.seed = description.seed;
-  settings.side_light = description.integrator.settings<PhotonDescription>().side_light;
+  settings.side_light = keeps_side_light(scene);
   settings.density = estimator_of(description.integrator.settings<PhotonDescription>().density);
   settings.keep_photons = description.output.wants("photons");
   if (description.output.wants("fluence"))
@@ -64,7 +67,7 @@ PlateLight light_of(const Scene& scene, PhotonDistribution traced) {
 
 PlateLight trace_photons(const Scene& scene, const PhotonSettings& settings, const Progress& progress) {
   PhotonDistribution traced =
-      distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, settings, progress);
+      distribute_photons(scene.field, scene.geometry, beam_on_plate(scene), scene.channels, settings, progress);
   const bool has_light = !settings.job || (is_root(settings.job->ranks) && !settings.job->is_shard);
   return has_light ? light_of(scene, std::move(traced)) : PlateLight();
 }
@@ -113,6 +116,23 @@ ChannelTable<PlateLanding> plate_channels() {
 }
 
 }  // namespace
+
+Beam beam_on_plate(const Scene& scene) {
+  if (!scene.description.light.fills_plate()) return scene.beam;
+  // Blurred photons from beside the plate are seen, too.
+  const PhotonDensity& density = scene.description.integrator.settings<PhotonDescription>().density;
+  Plate plate = *scene.geometry.surfaces().plate;
+  double beside = plate_margin * plate.size.maxCoeff();
+  if (density.kind == PhotonDensityKind::gaussian)
+    beside = std::max(beside, widest_gaussian * density.tau * plate.pixel_size().maxCoeff());
+  plate.size += Vector2d::Constant(2 * beside);
+  return widened_beam(scene.beam, plate.corners());
+}
+
+bool keeps_side_light(const Scene& scene) {
+  const bool shows_box = scene.description.light.fills_plate() && !scene.geometry.has_cut();
+  return scene.description.integrator.settings<PhotonDescription>().side_light.value_or(!shows_box);
+}
 
 void add_cost(const Statistics& more, Statistics& statistics) {
   statistics.seconds_tracing += more.seconds_tracing;

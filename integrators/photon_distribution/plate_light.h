@@ -21,6 +21,13 @@ struct PlateLight {
   Film irradiance;  ///< A plane for each band, if the scene writes spectral pictures.
 };
 
+/// The light of a scene that may fall on its plate: wide enough for all of it, if the scene's light fills it.
+Beam beam_on_plate(const Scene& scene);
+
+/// Whether light that leaves the volume by its side faces counts. By default it does where the picture shows a beam or
+/// a body, and not where the field just ends at its box.
+bool keeps_side_light(const Scene& scene);
+
 /// Adds the time, the steps and the samples of other work.
 void add_cost(const Statistics& more, Statistics& statistics);
 

@@ -254,6 +254,7 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
         scene.warnings.push_back("`/output/stokes` has no effect: it belongs to the method \"polariscope\"");
       return;
     }
+    default_annotations(scene, json, {Annotation::body});
     if (scene.bending.rgb) source.fail("`/bending/rgb`: the polariscope needs light with wavelengths; remove it");
     if (given(json, "/field/scale"))
       scene.warnings.push_back("`/field/scale` has no effect with polariscope; its key is `/integrator/stress_optic`");

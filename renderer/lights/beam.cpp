@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "base/geometry/box.h"
 #include "renderer/sampling/random.h"
@@ -89,6 +90,16 @@ Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Ve
     throw std::invalid_argument("seen along the light the volume has no area: choose another light direction");
   const double start = box.min().z() - 0.01 * size;
   beam.center = middle.x() * beam.right + middle.y() * beam.up + start * beam.direction;
+  return beam;
+}
+
+Beam widened_beam(Beam beam, const std::vector<Eigen::Vector3d>& points) {
+  std::vector<Eigen::Vector2d> all = beam.aperture;
+  for (const Eigen::Vector3d& point : points)
+    all.emplace_back((point - beam.center).dot(beam.right), (point - beam.center).dot(beam.up));
+  all = convex_hull(std::move(all));
+  if (!(area(all) > (1 + 1e-9) * area(beam.aperture))) return beam;
+  beam.core = std::exchange(beam.aperture, std::move(all));
   return beam;
 }
 

@@ -21,7 +21,8 @@ struct Beam {
   Eigen::Vector3d right = Eigen::Vector3d::UnitX();       ///< Unit, across the beam.
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();          ///< Unit, across the beam.
   std::vector<Eigen::Vector2d> aperture;                  ///< Convex polygon, counter-clockwise in (right, up).
-  std::optional<Eigen::Vector3d> source;                  ///< The point that the light comes from; none: parallel.
+  std::vector<Eigen::Vector2d> core;      ///< The part of the aperture whose light meets the volume; empty: all of it.
+  std::optional<Eigen::Vector3d> source;  ///< The point that the light comes from; none: parallel.
 
   /// World, of a position across the beam.
   Eigen::Vector3d start(const Eigen::Vector2d& across) const { return center + across.x() * right + across.y() * up; }
@@ -37,6 +38,15 @@ struct Beam {
 /// @throw std::invalid_argument if the silhouette has no area.
 Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& direction,
                      const Eigen::Vector3d& up);
+
+/// The part of the aperture whose light meets the volume.
+inline const std::vector<Eigen::Vector2d>& core_of(const Beam& beam) {
+  return beam.core.empty() ? beam.aperture : beam.core;
+}
+
+/// The beam with an aperture so wide that its light, if nothing bends it, also goes through `points`. What was the
+/// aperture is its core. Parallel light only.
+Beam widened_beam(Beam beam, const std::vector<Eigen::Vector3d>& points);
 
 /// Whether a source is among `points`, or so near that they are all around it: no beam from it covers them.
 bool is_surrounded(const Eigen::Vector3d& source, const std::vector<Eigen::Vector3d>& points);

@@ -131,6 +131,12 @@ void drop_unmade_outputs(SceneDescription& scene, const SceneSource& source) {
 
 bool given(const Json& json, const char* pointer) { return json.contains(Json::json_pointer(pointer)); }
 
+void default_annotations(SceneDescription& scene, const Json& json, std::vector<Annotation> annotations) {
+  if (given(json, "/output/annotations")) return;
+  scene.output.annotations = std::move(annotations);
+  scene.output.default_annotations = true;
+}
+
 void warn_unused(SceneDescription& scene, const Json& json, const char* key, const char* because_of) {
   if (!given(json, key) || !given(json, because_of)) return;
   scene.warnings.push_back(fmt::format("`{}` has no effect beside `{}`", key, because_of));

@@ -20,6 +20,9 @@ bool given(const Json& json, const char* pointer);
 /// Warns that `key` has no effect if both `key` and `because_of` are given.
 void warn_unused(SceneDescription& scene, const Json& json, const char* key, const char* because_of);
 
+/// Draws these over the picture where they have a meaning, if the scene file does not say what is drawn.
+void default_annotations(SceneDescription& scene, const Json& json, std::vector<Annotation> annotations);
+
 /// @throw SceneError if the normal is perpendicular to the light, so that the plane would be seen edge-on.
 void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* pointer, const LightDescription& light,
                   const SceneSource& source);

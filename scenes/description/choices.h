@@ -27,6 +27,7 @@ inline Words words(BorderChoice) { return {"auto", "fade", "extend"}; }
 inline Words words(BoundsChoice) { return {"auto", "none"}; }
 inline Words words(BendingMethod) { return {"auto", "euler", "splitting", "splitting4", "rk4", "bs23", "dopri5"}; }
 inline Words words(BeamPattern) { return {"grid", "stratified", "sobol", "random"}; }
+inline Words words(BeamReach) { return {"plate", "volume"}; }
 inline Words words(Projection) { return {"perspective", "orthographic"}; }
 inline Words words(LightKind) { return {"constant", "environment", "directional", "area", "point"}; }
 inline Words words(LightCaustic) { return {"auto", "map", "photons"}; }

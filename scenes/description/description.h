@@ -112,6 +112,10 @@ struct ApertureDescription {
   Eigen::Vector2d size{1, 1};             ///< Along the right and up axes of the light's frame; > 0.
 };
 
+/// How far the beam reaches, if there is no aperture: over the plate, so that undisturbed light is all around the
+/// volume's; or as far as the volume's silhouette.
+enum class BeamReach { plate, volume };
+
 struct LightDescription {
   /// Direction in which light travels; not zero, any length. None: "auto".
   std::optional<Eigen::Vector3d> direction = Eigen::Vector3d(0, 0, -1);
@@ -121,9 +125,12 @@ struct LightDescription {
   SpectrumDescription spectrum;
   double wavelength_min = 380, wavelength_max = 730;
   int wavelength_count = 32;
-  int wavelengths_per_photon = 0;               ///< Bands that one photon carries; 0: all.
-  double irradiance = 1;                        ///< Irradiance of the undisturbed beam, W per world unit²; > 0.
-  std::optional<ApertureDescription> aperture;  ///< Rectangle that light comes from; none: the volume's silhouette.
+  int wavelengths_per_photon = 0;  ///< Bands that one photon carries; 0: all.
+  double irradiance = 1;           ///< Irradiance of the undisturbed beam, W per world unit²; > 0.
+  BeamReach beam = BeamReach::plate;
+  std::optional<ApertureDescription> aperture;  ///< Rectangle that light comes from; none: as `beam` says.
+
+  bool fills_plate() const { return beam == BeamReach::plate && !aperture; }
 };
 
 struct ReceiverDescription {
@@ -132,7 +139,8 @@ struct ReceiverDescription {
   std::optional<Eigen::Vector3d> center;  ///< Middle, world; none: behind the middle of the volume, at `distance`.
   std::optional<Eigen::Vector3d> normal;  ///< None: opposite to the light's direction.
   std::optional<Eigen::Vector3d> up;      ///< Up axis of the plate; none: that of the light.
-  std::optional<Eigen::Vector2d> size;    ///< Width and height; none: 1.25 times the extent of the beam.
+  std::optional<Eigen::Vector2d> size;    ///< Width and height; none: the volume's as light projects it, or 1.25
+                                          ///< times the beam's if that does not fill the plate.
   /// Pixels along width and height; none: 512 along the longer side, square pixels.
   std::optional<Eigen::Vector2i> resolution;
 };

@@ -104,7 +104,11 @@ inline void describe(LightDescription& light, KeyVisitor& visit) {
         knob().with_examples({"D65", "E", "A", "blackbody 3000", "blackbody 5500", "blackbody 9000"}));
   visit.section("wavelengths", WavelengthKeys{light}, "the bands of light that are traced");
   visit("irradiance", light.irradiance, "irradiance of the undisturbed beam, W per world unit squared", above(0));
-  visit.section("aperture", light.aperture, "a rectangle that light comes from, instead of the volume's silhouette");
+  visit("beam", light.beam,
+        "plate: undisturbed light is all around the volume, on all of the plate; volume: light goes only through the "
+        "volume, and the plate is 1.25 times as large",
+        knob());
+  visit.section("aperture", light.aperture, "a rectangle that light comes from, instead of `beam`");
 }
 
 inline void describe(ReceiverDescription& receiver, KeyVisitor& visit) {
@@ -114,7 +118,7 @@ inline void describe(ReceiverDescription& receiver, KeyVisitor& visit) {
   visit("center", receiver.center, "middle of the plate, world");
   visit("normal", receiver.normal, "normal of the plate; default: opposite to the light", not_zero().as_knob());
   visit("up", receiver.up, "up axis of the plate; default: that of the light", not_zero());
-  visit("size", receiver.size, "width and height, world units; default: 1.25 times the extent of the beam",
+  visit("size", receiver.size, "width and height, world units; default: what straight light from the volume reaches",
         above(0).as_knob());
   visit("resolution", receiver.resolution, "pixels, width and height; default: 512 along the longer side",
         between(1, 32768).or_one_for_all());

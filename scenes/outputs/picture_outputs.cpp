@@ -1,6 +1,7 @@
 #include "scenes/outputs/picture_outputs.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -18,6 +19,8 @@
 
 namespace tensorray {
 namespace {
+
+constexpr std::array<float, 3> hatch_line{0.42f, 0.5f, 0.66f}, hatch_ground{0.24f, 0.3f, 0.42f};  // Linear Rec. 709.
 
 /// Marks a file with the display that its colours are for; with nothing if that is not known.
 void add_display(const Scene& scene, const Render& render, ImageMetadata& metadata) {
@@ -137,6 +140,16 @@ std::optional<double> brightest_hundredth(const Image& linear) {
   return *bright;
 }
 
+/// Puts diagonal lines behind a pixel with alpha, which becomes opaque.
+/// @param divided  Whether its colours are divided by alpha.
+void lay_hatch(Image& image, int x, int y, bool divided) {
+  const int pitch = std::max(8, std::min(image.width, image.height) / 40);
+  const std::array<float, 3> color = (x + y) % pitch < pitch / 4 ? hatch_line : hatch_ground;
+  float* const pixel = image.pixel(x, y);
+  for (std::size_t c = 0; c < 3; ++c) pixel[c] = pixel[c] * (divided ? pixel[3] : 1) + (1 - pixel[3]) * color[c];
+  pixel[3] = 1;
+}
+
 }  // namespace
 
 std::vector<Output> picture_outputs(const std::vector<Output>& more) {
@@ -201,6 +214,10 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha) 
     const float alpha = divides && in[3] > 0 ? in[3] : 1;
     for (int c = 0; c < 3; ++c) out[c] = gain * in[c] / alpha;
     if (has_alpha) out[3] = in[3];
+    if (render.is_hatched && render.is_hatched(in)) {
+      const auto at = static_cast<int>(i);
+      lay_hatch(image, at % image.width, at / image.width, divides);
+    }
   }
   draw_annotations(scene, render, exposure, image);
   scene.color.to_display(image);

@@ -15,7 +15,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double default_margin = 1.25;    // Size of the plate, in extents of the beam.
+constexpr double dark_margin = 1.25;       // Size of the plate, in extents of a beam that does not fill it.
 constexpr double default_distance = 0.25;  // Distance of the plate behind the volume, in depths of the volume.
 constexpr double max_size = 1e5;  // Largest size of the scene, in sizes of the volume: Embree is single precision.
 constexpr double narrowest_white = 100;   // nm: light of a narrower range has no white.
@@ -117,7 +117,7 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
   if (normal.dot(beam.direction) > 0) normal = -normal;
   plate.up = upright(normal, receiver.up.value_or(beam.up));
   plate.right = plate.up.cross(normal);
-  plate.size = receiver.size.value_or(default_margin * lit_extent(plate, beam));
+  plate.size = receiver.size.value_or((description.light.fills_plate() ? 1 : dark_margin) * lit_extent(plate, beam));
   if (!receiver.size) plate.size = plate.size.cwiseMax(narrowest_plate * plate.size.maxCoeff());
   if (!(plate.size.minCoeff() > 0) || !plate.size.allFinite())
     throw SceneError(description.path.string() +

@@ -7,7 +7,7 @@ namespace tensorray {
 namespace {
 
 // Cosine: about 45°, so that faces at 45° are no side faces whatever rounding does.
-constexpr double along_light = 0.7;
+constexpr double along_light = 1e-9;
 constexpr double at_face = 1e-5;  // In sizes of the box: a ray that ends so near to the face has left.
 
 }  // namespace
@@ -56,15 +56,12 @@ PathPoint path_point(const TensorField& field, const RayRecord& record, std::siz
 }
 
 SideFaces::SideFaces(const TensorField& field, const Eigen::Vector3d& direction) : field_(field) {
-  std::array<double, 6> cosines{};
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d normal = field.to_index().linear().row(axis).normalized();
-    cosines[2 * axis + 1] = normal.dot(direction.normalized());
-    cosines[2 * axis] = -cosines[2 * axis + 1];
+    const double cosine = normal.dot(direction.normalized());
+    is_side_[2 * axis] = -cosine < along_light;
+    is_side_[2 * axis + 1] = cosine < along_light;
   }
-  const bool is_oblique = *std::max_element(cosines.begin(), cosines.end()) < along_light;
-  for (std::size_t face = 0; face < cosines.size(); ++face)
-    is_side_[face] = cosines[face] < along_light && !(is_oblique && cosines[face] > 0);
 }
 
 /// @param position, direction  Of the straight end of a ray.

@@ -166,9 +166,7 @@ struct RayRecord {
 /// Point i of the ray, without its tensor.
 PathPoint path_point(const TensorField& field, const RayRecord& record, std::size_t i);
 
-/// The side faces of a field's box for light of one direction: those whose outward normals are more across the light
-/// than along it. Light may be so oblique that these are all faces. Then they are those through which straight light
-/// does not leave the box.
+/// The side faces of a field's box for light of one direction: those through which straight light does not leave it.
 class SideFaces {
  public:
   /// @param field      Must outlive it.

@@ -204,7 +204,41 @@ class TriangleBuilder {
   std::vector<std::uint32_t> first_outline_edge_, next_edge_;
 };
 
+/// The part of a convex polygon on the left of a line.
+std::vector<Eigen::Vector2d> part_left_of(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                                          const std::vector<Eigen::Vector2d>& polygon) {
+  const Eigen::Vector2d left = Eigen::Vector2d(from.y() - to.y(), to.x() - from.x()).normalized();
+  const double rounding = 1e-12 * (to - from).norm();
+  std::vector<Eigen::Vector2d> part;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double at_a = left.dot(a - from), at_b = left.dot(b - from);
+    if (at_a >= -rounding) part.push_back(a);
+    if (std::min(at_a, at_b) < -rounding && std::max(at_a, at_b) > rounding)
+      part.emplace_back(a + at_a / (at_a - at_b) * (b - a));
+  }
+  return part;
+}
+
 }  // namespace
+
+std::vector<Patch> patches_around(const std::vector<Eigen::Vector2d>& inner, const std::vector<Eigen::Vector2d>& outer,
+                                  double quad_size) {
+  constexpr double least_part = 1e-9;
+  std::vector<Patch> patches;
+  std::vector<Eigen::Vector2d> rest = outer;
+  for (std::size_t i = 0; i < inner.size(); ++i) {
+    const Eigen::Vector2d &from = inner[i], &to = inner[(i + 1) % inner.size()];
+    const std::vector<Eigen::Vector2d> part = part_left_of(to, from, rest);
+    rest = part_left_of(from, to, rest);
+    if (part.size() < 3 || !(area(part) > least_part * area(outer))) continue;
+    for (Patch& patch : patches_of(part, quad_size)) {
+      patch.is_edge = {};
+      patches.push_back(patch);
+    }
+  }
+  return patches;
+}
 
 std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, double quad_size) {
   std::vector<Patch> patches;

@@ -33,6 +33,10 @@ struct Patch {
 /// at most 4096 along a side.
 std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, double quad_size);
 
+/// Patches that cover what a convex polygon has around another one. No side of theirs is an edge.
+std::vector<Patch> patches_around(const std::vector<Eigen::Vector2d>& inner, const std::vector<Eigen::Vector2d>& outer,
+                                  double quad_size);
+
 struct Quad {
   std::uint32_t patch = 0, x = 0, y = 0;                     // The lower left corner, on the finest lattice.
   int level = 0;                                             // 0: a first quad; each level halves the side.

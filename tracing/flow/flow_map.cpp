@@ -27,6 +27,7 @@ constexpr double margin = 1.0 / 8;  // Extension of the plate on each side, in s
 constexpr double first_pixels = 8;       // In pixels of straight light.
 constexpr double first_voxels = 1;       // In voxels of the finest level, so that no part of the field is missed; ...
 constexpr double max_for_voxels = 64;    // ... but voxels ask for no more quads than this along a side.
+constexpr double most_around = 64;       // First quads along the beam, of light beside its core: it is straight.
 constexpr double usual_tolerance = 0.5;  // Pixels.
 
 constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
@@ -50,13 +51,13 @@ double pixel_of_starts(const Plate& plate, const Beam& beam) {
 /// tolerance has smaller quads. If few vertices are allowed, quads are large: a quarter of the vertices is for the
 /// first quads and their first division.
 double first_size(const TensorField& field, const Beam& beam, double pixel, const FlowSettings& settings) {
-  const Eigen::Vector2d extent = box_of(beam.aperture).sizes();
+  const Eigen::Vector2d extent = box_of(core_of(beam)).sizes();
   const double voxel =
       std::ldexp(start_ratio(beam, field.world_box().center()) * field.to_world().linear().colwise().norm().minCoeff(),
                  1 - field.levels());
   const double for_voxels = std::max(first_voxels * voxel, extent.maxCoeff() / max_for_voxels);
   const double usual = std::min(first_pixels * pixel, for_voxels);
-  const double least = std::sqrt(16 * extent.prod() / static_cast<double>(settings.max_starts));
+  const double least = std::sqrt(16 * box_of(beam.aperture).sizes().prod() / static_cast<double>(settings.max_starts));
   return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
 }
 
@@ -272,7 +273,11 @@ class FlowMapBuilder {
         vertices_(field, geometry, beam, bending, settings, progress) {
     const double pixel = pixel_of_starts(plate_, beam);
     const double size = first_size(field, beam, pixel, settings);
-    lattice().patches = patches_of(beam.aperture, size);
+    lattice().patches = patches_of(core_of(beam), size);
+    if (!beam.core.empty()) {
+      const double around = std::max(size, box_of(beam.aperture).sizes().maxCoeff() / most_around);
+      for (const Patch& patch : patches_around(beam.core, beam.aperture, around)) lattice().patches.push_back(patch);
+    }
     lattice().is_graded = settings.silhouette;
     first_size_ = static_cast<float>(size / pixel);
     const double finest = std::min(settings.finest, settings.tolerance) * pixel;
@@ -521,8 +526,9 @@ int band_count(const FlowMap& map, int channels, const BandStep& step) {
       if (map.ends[at] == RayEnd::plate && map.ends[at - 1] == RayEnd::plate)
         sweep += (map.landings[at] - map.landings[at - 1]).norm();
     }
-    sweeps.push_back(sweep);
+    if (sweep > 0) sweeps.push_back(sweep);  // Straight light does not count.
   }
+  if (sweeps.empty()) sweeps.push_back(0);
   const auto place = static_cast<std::ptrdiff_t>(swept_share * static_cast<double>(sweeps.size() - 1));
   std::nth_element(sweeps.begin(), sweeps.begin() + place, sweeps.end());
   const double wanted = std::max<double>(step.least, sweeps[static_cast<std::size_t>(place)] / step.pixels);

@@ -104,7 +104,7 @@ struct FlowMap {
 
 /// How finely a spectrum is divided into bands.
 struct BandStep {
-  double pixels = 1;  ///< Light moves by no more than this from band to band, for 99 of 100 vertices.
+  double pixels = 1;  ///< Light moves by no more than this from band to band, for 99 of 100 vertices whose light moves.
   int least = 1;      ///< Number of bands, at least; ...
   int most = 128;     ///< ... and at most.
 };

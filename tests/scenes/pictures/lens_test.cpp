@@ -93,6 +93,23 @@ TEST_F(Lens, DepthsStandSideBySideAndLessOfTheVolumeBendsLess) {
   }
 }
 
+/// Where no light of the image arrives, the picture that is looked at is hatched; the EXR is as it was, and between
+/// pictures nothing is drawn.
+TEST_F(Lens, IsHatchedWhereNoLightArrives) {
+  write("scene.json",
+        small_lens(R"("image": "color_wheel", "image_plane": {"depth": [0, 0.5], "size": [1, 1]})", no_bending));
+  const Image linear = render({}, {"hatched.png"}), same = render({"integrator.empty=transparent"}, {"empty.png"});
+  EXPECT_EQ(linear.pixels, same.pixels);
+  const std::vector<float> alpha = channel(linear, "A"), hatched = channel(read_image(in_folder("hatched.png")), "A"),
+                           empty = channel(read_image(in_folder("empty.png")), "A");
+  for (std::size_t i = 0; i < alpha.size(); ++i) {
+    const bool is_gap = i % 97 == 48, sees = alpha[i] == 1;
+    EXPECT_EQ(hatched[i], is_gap ? 0 : 1) << i;
+    if (sees || alpha[i] == 0) EXPECT_EQ(empty[i], sees ? 1 : 0) << i;
+  }
+  EXPECT_NEAR(sum(alpha), 2 * 20 * 20, 1);  // Of 48 × 32 pixels of 0.05.
+}
+
 /// Pixels that are brighter than all their neighbours, in one colour: a fold's light has none.
 TEST_F(Lens, NoPixelStandsOutBesideAFold) {
   write("scene.json", R"({

@@ -215,18 +215,29 @@ TEST_F(MeshLight, SettingsWithoutEffectAndErrorsThatCannotBeReachedAreTold) {
 }
 
 // Light that leaves a volume by its side faces (integrator.side_light).
-/// Light of one colour on a plate that catches all of it. @param s  Its flexibility. @param side_light  Null: default.
-Render light_of(const std::string& density, double s, const Json& side_light) {
-  Json json{{"field",
-             {{"generate", {{"kind", "constant"}, {"resolution", 9}, {"tensor", {{0, 0, 1}, {0, 0, 0}, {1, 0, 0}}}}},
-              {"eigenvalues", "raw"},
-              {"scale", 1}}},
-            {"bending", {{"rgb", {s, s, s}}}},
-            {"light", {{"direction", {0, 0, -1}}, {"photons", 60000}}},
-            {"receiver", {{"distance", 0.1}, {"size", {8, 8}}, {"resolution", {256, 256}}}},
-            {"integrator", {{"type", "photon_distribution"}, {"density", {{"kind", density}}}}}};
-  if (!side_light.is_null()) json["integrator"]["side_light"] = side_light;
+/// A cube in which all light of one colour turns alike, before a plate that catches all of it.
+/// @param s  Flexibility of the light.
+Json turning_cube(const std::string& density, double s) {
+  return {{"field",
+           {{"generate", {{"kind", "constant"}, {"resolution", 9}, {"tensor", {{0, 0, 1}, {0, 0, 0}, {1, 0, 0}}}}},
+            {"eigenvalues", "raw"},
+            {"scale", 1}}},
+          {"bending", {{"rgb", {s, s, s}}}},
+          {"light", {{"direction", {0, 0, -1}}, {"photons", 60000}}},
+          {"receiver", {{"distance", 0.1}, {"size", {8, 8}}, {"resolution", {256, 256}}}},
+          {"integrator", {{"type", "photon_distribution"}, {"density", {{"kind", density}}}}}};
+}
+
+Render light_of(const Json& json) {
   return render(load_scene(read_scene_json(json, "scene.json"), Progress()), Progress());
+}
+
+/// Of a beam that is as wide as the cube. @param side_light  Null: default.
+Render light_of(const std::string& density, double s, const Json& side_light) {
+  Json json = turning_cube(density, s);
+  json["light"]["beam"] = "volume";
+  if (!side_light.is_null()) json["integrator"]["side_light"] = side_light;
+  return light_of(json);
 }
 
 /// Power by end, as a part of what is emitted.
@@ -267,8 +278,74 @@ TEST(SideLight, IsLeftOutAndCounted) {
     const double lit_without = std::accumulate(without.linear.pixels.begin(), without.linear.pixels.end(), 0.0);
     // The volume is 64 pixels wide; the mesh knows the edge of the light that is left to one of them.
     EXPECT_NEAR(lit_without / lit_with, 1 - side, 1.0 / 64) << density;
-    ASSERT_EQ(without.warnings.size(), 1u) << density;
-    EXPECT_THAT(without.warnings[0], HasSubstr("side faces")) << density;
+    ASSERT_EQ(without.notes.size(), 1u) << density;
+    EXPECT_THAT(without.notes[0], HasSubstr("side faces")) << density;
+    EXPECT_EQ(light_of(density, s, {}).linear.pixels, with.linear.pixels) << density;
+  }
+}
+
+// Undisturbed light about the volume (light.beam).
+
+/// Straight light is 1 on all of a plate: the default one, one larger than the volume, a part, one beside it, and
+/// cos 45° on one that is inclined so.
+TEST(UndisturbedLight, IsOneOnAllOfThePlate) {
+  const std::vector<std::pair<Json, double>> plates{{Json::object(), 1},
+                                                    {{{"size", {7, 5}}}, 1},
+                                                    {{{"size", {0.5, 0.3}}}, 1},
+                                                    {{{"size", {2, 2}}, {"center", {2, 1, -4}}}, 1},
+                                                    {{{"size", {5, 5}}, {"normal", {1, 0, 1}}}, std::sqrt(0.5)}};
+  for (const std::string density : {"mesh", "gaussian", "histogram"})
+    for (const auto& direction : std::vector<Eigen::Vector3d>{{0, 0, -1}, {0.3, 0.1, -1}, {1, 1, -1.5}})
+      for (const auto& [plate, cosine] : plates) {
+        if (plate.contains("normal") && direction.x() != 0) continue;
+        Json json = turning_cube(density, 0);
+        json["light"]["direction"] = {direction.x(), direction.y(), direction.z()};
+        json["receiver"] = plate;
+        json["receiver"]["resolution"] = {48, 48};
+        const Render render = light_of(json);
+        const std::string what = density + json.dump();
+        const auto [least, most] = std::minmax_element(render.linear.pixels.begin(), render.linear.pixels.end());
+        // Rays start 3e-6 of the volume's light inside of its edge, which is up to 500 pixels long. Photons are evenly
+        // spread: of those in a pixel, ten or more, some along its edges are elsewhere.
+        const double error = density == "mesh" ? 2e-3 : density == "gaussian" ? 0.03 : 0.6;
+        EXPECT_NEAR(*least, cosine, error) << what;
+        EXPECT_NEAR(*most, cosine, error) << what;
+        EXPECT_EQ(share(render, RayEnd::side), 0) << what;
+      }
+}
+
+/// Light from the cube is displaced by x within it, and by the distance of the plate times its slope behind it: it
+/// leaves a gap on one side, and lies over the undisturbed light on the other. What leaves by the side is left out.
+TEST(UndisturbedLight, IsBesideLightThatIsDisplaced) {
+  const double s = 0.3, x = 2 * displaced_part(s), pixel = 8.0 / 256;
+  for (const std::string density : {"mesh", "histogram"}) {
+    Json json = turning_cube(density, s);
+    json["light"]["photons"] = 400000;
+    const Render light = light_of(json);
+    const auto at = [&](double from, double to) {  // Mean of the middle rows; light is displaced to −x.
+      double sum = 0;
+      int count = 0;
+      for (int y = 110; y < 146; ++y)
+        for (int column = 0; column < 256; ++column) {
+          const double place = (column + 0.5) * pixel - 4;
+          if (place < from + pixel || place > to - pixel) continue;
+          sum += light.linear.pixel(column, y)[1];
+          ++count;
+        }
+      return sum / count;
+    };
+    const double error = density == "mesh" ? 1e-3 : 0.02;
+    EXPECT_NEAR(at(-4, -1.1), 1, error) << density;
+    EXPECT_NEAR(at(-0.98, 1 - x - 0.1), 1, error) << density;
+    EXPECT_NEAR(at(1 - x, 1), 0, error) << density;
+    EXPECT_NEAR(at(1, 4), 1, error) << density;
+    // All light that is emitted, but for that of the sides, lands or misses the plate.
+    const double emitted =
+        light.statistics.power.empty() ? 0 : light.statistics.beam_power * share(light, RayEnd::side);
+    if (density == "mesh") EXPECT_NEAR(emitted, 3 * 2 * x / 3, 0.05);
+    EXPECT_NEAR(std::accumulate(light.linear.pixels.begin(), light.linear.pixels.end(), 0.0) / 3 * pixel * pixel,
+                64 - 2 * x, 0.1)
+        << density;
   }
 }
 
