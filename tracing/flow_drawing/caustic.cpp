@@ -63,28 +63,37 @@ struct FlowPieces {
 constexpr std::size_t group_size = 512;  // Triangles; their landings stay in the cache while they are drawn.
 constexpr Detail max_detail = 15;
 
-// Light that is drawn at more places than this is faint at each: then it may move by up to two steps between them.
-constexpr double many_places = 128;
+/// How the light of a vertex moves over the plate.
+struct Movement {
+  double fastest = 0;   // From sample to sample, at most, pixels.
+  bool is_same = true;  // Whether all of it ends on the same thing.
+};
 
-/// Distance that the light of a vertex moves from sample to sample, at most, pixels; infinite if it does not always end
-/// on the same thing. It is that of the parabola through three samples, which are traced even where others are
-/// predicted: what a prediction misses must not change how often a triangle is drawn.
-double movement(const FlowMap& map, std::size_t vertex) {
-  const std::size_t first = vertex * map.wavelengths, last = first + map.wavelengths - 1;
-  for (std::size_t i = first + 1; i <= last; ++i)
-    if (map.ends[i] != map.ends[first]) return std::numeric_limits<double>::infinity();
-  if (map.wavelengths == 1 || map.ends[first] != RayEnd::plate) return 0;
+/// The movement is that of the parabola through three samples: of a vertex that always lands these are traced, even
+/// where others are predicted. What a prediction misses must not change how often a triangle is drawn.
+Movement movement_of(const FlowMap& map, std::size_t vertex) {
+  const std::size_t begin = vertex * map.wavelengths, end = begin + map.wavelengths;
+  Movement movement;
+  std::size_t first = end, last = begin;  // That land.
+  for (std::size_t i = begin; i < end; ++i) {
+    movement.is_same = movement.is_same && map.ends[i] == map.ends[begin];
+    if (map.ends[i] != RayEnd::plate) continue;
+    first = std::min(first, i);
+    last = i;
+  }
+  if (first >= last) return movement;
+  const std::size_t before = (first + last) / 2, after = (first + last + 1) / 2;  // The middle may be no sample.
   const Eigen::Vector2f a = map.landings[first], c = map.landings[last];
-  // In the middle, where there may be no sample.
-  const Eigen::Vector2f b = (map.landings[(first + last) / 2] + map.landings[(first + last + 1) / 2]) / 2;
+  Eigen::Vector2f b = (a + c) / 2;
+  if (map.ends[before] == RayEnd::plate && map.ends[after] == RayEnd::plate)
+    b = (map.landings[before] + map.landings[after]) / 2;
   const float fastest = std::max((4 * b - 3 * a - c).norm(), (3 * c - 4 * b + a).norm());  // At the ends.
-  return fastest / static_cast<float>(map.wavelengths - 1);
+  movement.fastest = fastest / static_cast<float>(last - first);
+  return movement;
 }
 
-/// @param steps  The steps that light moves within each of `bands` bands.
-Detail detail_for(double steps, std::size_t bands, Detail least) {
-  if (!std::isfinite(steps)) return 0;
-  steps /= std::clamp(steps * static_cast<double>(bands) / many_places, 1.0, 2.0);
+/// @param steps  The steps that light moves within each band.
+Detail detail_for(double steps, Detail least) {
   if (steps > 1) return static_cast<Detail>(std::min<double>(std::ceil(steps) - 1, max_detail));
   Detail detail = 0;
   while (detail > least && std::ldexp(steps, 1 - detail) <= 1) --detail;
@@ -203,7 +212,8 @@ FlowPieces divide_map(const FlowMap& map, double steps, std::size_t bands) {
   pieces.edges = edges_of_triangles(map);
   std::vector<std::int8_t> of_vertex(map.starts.size());
   tbb::parallel_for(std::size_t{0}, map.starts.size(), [&](std::size_t i) {
-    of_vertex[i] = static_cast<std::int8_t>(detail_for(steps * movement(map, i), bands, least));
+    const Movement movement = movement_of(map, i);
+    of_vertex[i] = static_cast<std::int8_t>(detail_for(steps * movement.fastest, movement.is_same ? least : 0));
   });
   for (const FlowTriangle& triangle : map.triangles) {
     const auto& [a, b, c] = triangle.corners;

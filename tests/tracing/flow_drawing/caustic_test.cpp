@@ -129,6 +129,34 @@ TEST(Caustic, ABandIsSweptInStepsOfAPixel) {
   EXPECT_LT(std::sqrt(squares / all), 0.02);
 }
 
+/// A prism: a strip of light that each wavelength moves further. The light of a column is that of a box, the strip,
+/// averaged over the way that it moves. Beyond the bands that are drawn it lands on something else, or does not.
+TEST(Caustic, ASpectrumHasItsClosedFormWhateverItsEndsMeet) {
+  constexpr double left = 5, width = 5, way = 41;
+  constexpr int count = 20;
+  std::vector<CausticBand> bands(count);
+  for (int i = 0; i < count; ++i) bands[i] = {(i + 0.5) / count, 1.0 / count, 0, 1.0 / count};
+  const auto integral = [](double x) { return x <= 0 ? 0 : x < width ? x * x / 2 / width : x - width / 2; };
+  const auto before = [&](double x) { return (integral(x - left) - integral(x - left - way)) / way; };
+  for (const RayEnd end : {RayEnd::plate, RayEnd::missed, RayEnd::obstacle}) {
+    FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(left + width * at.x(), 40 * at.y()); });
+    std::vector<Eigen::Vector2f> landings;
+    for (const Eigen::Vector2f& at : map.landings)
+      for (int sample = 0; sample < 3; ++sample) landings.emplace_back(at + Eigen::Vector2f(sample * float(way), 0));
+    map.landings = landings;
+    map.wavelengths = 3;
+    map.ends.assign(landings.size(), RayEnd::plate);
+    for (std::size_t i = 2; i < map.ends.size(); i += 3) map.ends[i] = end;
+    const Caustic caustic = draw_caustic(map, unit_plate(), bands, {}, Progress());
+    EXPECT_NEAR(power_of(caustic, RayEnd::plate), 1, 1e-9);
+    for (int x = 0; x < pixels; ++x) {
+      double power = 0;
+      for (int y = 0; y < pixels; ++y) power += caustic.irradiance.values[static_cast<std::size_t>(y * pixels + x)];
+      EXPECT_NEAR(power * unit_plate().pixel_area(), before(x + 1) - before(x), 0.01 / way) << x;
+    }
+  }
+}
+
 /// Light of a wavelength that nobody sees has power, too.
 TEST(Caustic, LightWithoutColourHasPower) {
   const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 48));
