@@ -264,7 +264,8 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
     if (scene.output.stokes && !scene.output.wants("spectral"))
       scene.warnings.push_back("`/output/stokes` has no effect without `/output/spectral`");
     const double picture = static_cast<double>(channel_names(polariscope_channels()).size()) * sizeof(float);
-    check_receiver_memory(scene, 2 * picture + spectral_channels(scene) * (2.0 * sizeof(float) + sizeof(double)), source);
+    check_receiver_memory(scene, 2 * picture + spectral_channels(scene) * (2.0 * sizeof(float) + sizeof(double)),
+                          source);
   }
 
   std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
