@@ -32,7 +32,7 @@ void find_turns(const RaySteps& steps, RayTurns& turns) {
     F part = set(1);
     auto squares = hn::Zero(ints);
     for (int n = 0; n < 120; ++n) {
-      const auto is_large = hn::Gt(part * angle, set(0.75));  // 0.75⁹ / 9! is 2e-7: what the series below cut.
+      const auto is_large = hn::Gt(part * angle, set(0.35));  // The series below leave 1e-7 of it.
       if (hn::AllFalse(d, is_large)) break;
       part = hn::IfThenElse(is_large, part * set(0.5), part);
       squares = hn::Sub(squares, hn::VecFromMask(ints, hn::RebindMask(ints, is_large)));
@@ -40,50 +40,62 @@ void find_turns(const RaySteps& steps, RayTurns& turns) {
     store(part * alpha, turns.alpha + at);
     store(part * beta, turns.beta + at);
     store(part * gamma, turns.gamma + at);
+    store(part * part * (alpha * alpha + beta * beta), turns.square + at);
     hn::StoreU(squares, ints, turns.squares + at);
     store(set(0.5) * (hn::Sqrt(a1 * a1 + b1 * b1) + hn::Sqrt(a2 * a2 + b2 * b2)), turns.phase + at);
   }
 }
 
-/// A unitary matrix, but for its length, as a quaternion.
+/// A unitary matrix, but for its length.
 struct Quaternion {
   F w, x, y, z;
 };
 
-HWY_INLINE Quaternion operator*(const Quaternion& p, const Quaternion& q) {
-  const auto sum = [](F a, F b, F c, F d, F e, F f, F g, F h)
-                       HWY_ATTR { return hn::MulAdd(a, b, hn::MulAdd(c, d, hn::NegMulAdd(g, h, e * f))); };
-  return {hn::NegMulAdd(p.x, q.x, hn::NegMulAdd(p.y, q.y, hn::NegMulAdd(p.z, q.z, p.w * q.w))),
-          sum(p.w, q.x, p.x, q.w, p.y, q.z, p.z, q.y), sum(p.w, q.y, p.y, q.w, p.z, q.x, p.x, q.z),
-          sum(p.w, q.z, p.z, q.w, p.x, q.y, p.y, q.x)};
+HWY_INLINE Quaternion scaled(F scale, const Quaternion& q) {
+  return {scale * q.w, scale * q.x, scale * q.y, scale * q.z};
 }
 
-HWY_INLINE Quaternion quaternion_of(const RayTurns& turns, std::size_t ray, F g) {
-  const F alpha = set(turns.alpha[ray]), beta = set(turns.beta[ray]), gamma = g * set(turns.gamma[ray]);
-  const F x = g * g * (alpha * alpha + beta * beta + gamma * gamma);  // The square of the angle.
-  const F sine = g * (set(1) + x * (set(-1 / 6.0) + x * (set(1 / 120.0) + x * set(-1 / 5040.0))));
-  // With w − 1 for w, which has few digits of small angles.
-  Quaternion q{x * (set(-0.5) + x * (set(1 / 24.0) + x * (set(-1 / 720.0) + x * set(1 / 40320.0)))), alpha * sine,
-               beta * sine, gamma * sine};
+HWY_INLINE Quaternion unit(const Quaternion& q) {
+  return scaled(set(1) / hn::Sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z), q);
+}
+
+/// The product with a quaternion whose real part is 0, and `sum`.
+HWY_INLINE Quaternion add_product(const Quaternion& v, const Quaternion& q, const Quaternion& sum) {
+  const auto add = [](F a, F b, F c, F d, F minus_e, F f, F to)
+                       HWY_ATTR { return hn::MulAdd(a, b, hn::MulAdd(c, d, hn::NegMulAdd(minus_e, f, to))); };
+  return {hn::NegMulAdd(v.x, q.x, hn::NegMulAdd(v.y, q.y, hn::NegMulAdd(v.z, q.z, sum.w))),
+          add(v.x, q.w, v.y, q.z, v.z, q.y, sum.x), add(v.y, q.w, v.z, q.x, v.x, q.z, sum.y),
+          add(v.z, q.w, v.x, q.y, v.y, q.x, sum.z)};
+}
+
+/// The product of a step's quaternion and that of the light before it.
+HWY_INLINE Quaternion turned(const RayTurns& turns, std::size_t ray, F g, const Quaternion& before) {
+  const F one = set(1), alpha = set(turns.alpha[ray]), beta = set(turns.beta[ray]), gamma = g * set(turns.gamma[ray]);
+  const F t = g * g * hn::MulAdd(gamma, gamma, set(turns.square[ray]));  // The square of the angle.
+  // The tangent over the angle, as far as it matters.
+  const F high = hn::MulAdd(t, hn::MulAdd(t, set(62 / 2835.0), set(17 / 315.0)), set(2 / 15.0));
+  const F tangent = g * hn::MulAdd(t, hn::MulAdd(t, high, set(1 / 3.0)), one);
+  Quaternion q{one, alpha * tangent, beta * tangent, gamma * tangent};
+  if (turns.squares[ray] == 0) return add_product(q, before, before);
   for (int n = 0; n < turns.squares[ray]; ++n) {
-    const F twice = set(2) * q.w + set(2), squares = q.x * q.x + q.y * q.y + q.z * q.z;
-    // Beyond a quarter turn, 1 + w has few digits.
-    q = {hn::IfThenElse(hn::Lt(q.w, set(-1)), set(-2) * squares, q.w * (twice + set(2))), twice * q.x, twice * q.y,
-         twice * q.z};
+    const F cosine = q.w * q.w, sine = q.x * q.x + q.y * q.y + q.z * q.z, twice = set(2) * q.w;
+    q = scaled(one / (cosine + sine), {cosine - sine, twice * q.x, twice * q.y, twice * q.z});
   }
-  q.w = q.w + set(1);
-  return q;
+  return add_product(q, before, scaled(q.w, before));
 }
 
 void take_turns(const RayTurns* turns, std::size_t count, std::size_t ray, const float* strengths, std::size_t room,
                 float weight, float* quaternions, float* light) {
   for (std::size_t at = 0; at < room; at += hn::Lanes(Floats())) {
+    const F g = load(strengths + at);
     Quaternion q{set(1), set(0), set(0), set(0)};
-    for (std::size_t i = 0; i < count; ++i) q = quaternion_of(turns[i], ray, load(strengths + at)) * q;
-    const F scale = set(1) / hn::Sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
-    const F w = scale * q.w, x = scale * q.x, y = scale * q.y, z = scale * q.z;
-    const F unit[4] = {w, x, y, z};
-    for (std::size_t c = 0; c < 4; ++c) store(unit[c], quaternions + c * room + at);
+    for (std::size_t i = 0; i < count; ++i) {
+      q = turned(turns[i], ray, g, q);
+      if (i % 64 == 63) q = unit(q);  // Before it is too long.
+    }
+    const auto [w, x, y, z] = unit(q);
+    const F quaternion[4] = {w, x, y, z};
+    for (std::size_t c = 0; c < 4; ++c) store(quaternion[c], quaternions + c * room + at);
     const F one = set(weight), t = set(2 * weight);
     const F more[10] = {one - t * (y * y + z * z),
                         t * (x * y - w * z),

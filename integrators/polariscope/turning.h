@@ -26,6 +26,7 @@ constexpr double gauss_point = 0.28867513459481287;
 /// Magnus' exponent of fourth order, whose last part is the turning of the axes.
 struct RayTurns {
   float alpha[ray_lanes], beta[ray_lanes], gamma[ray_lanes];  ///< Of a part of the step: its angle is small, ...
+  float square[ray_lanes];                                    ///< α² + β².
   int squares[ray_lanes];                                     ///< ... and its matrix is squared so many times.
   float phase[ray_lanes];                                     ///< ∫√(a² + b²) dz of the whole step.
 };

@@ -75,8 +75,8 @@ void prepare_images(const std::vector<std::filesystem::path>& files);
 /// @throw std::runtime_error naming the file and the reason (also if the disk is full).
 void write_image(const std::filesystem::path& path, const Image& image, const ImageMetadata& metadata = {});
 
-/// The bytes of a PNG of 8 bits, for a browser: quickly, and without metadata. Channels and values are those of a PNG of
-/// write_image. @throw std::invalid_argument as write_image.
+/// The bytes of a PNG of 8 bits, for a browser: quickly, and without metadata. Channels and values are those of a PNG
+/// of write_image. @throw std::invalid_argument as write_image.
 std::vector<unsigned char> encode_for_screen(const Image& image);
 
 /// Reads a picture as floats with the values of the file (integers are scaled to 0 to 1). Colours are not converted and
