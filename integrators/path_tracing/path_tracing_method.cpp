@@ -253,16 +253,9 @@ void PathTracingMethod::check(SceneDescription& scene, const Json& json, const S
   if (paths.radius.min && paths.radius.max && *paths.radius.min > *paths.radius.max)
     source.fail("`/integrator/radius`: `min` must not exceed `max`");
   if (!chosen) return;
-<<<<<<< HEAD
-  if (!given(json, "/output/annotations")) {
-    scene.output.annotations = {Annotation::scale};
-    if (paths.color.legend || !given(json, "/integrator/color/legend"))
-      scene.output.annotations.push_back(Annotation::legend);
-    scene.output.default_annotations = true;
-  }
-=======
-  default_annotations(scene, json, {Annotation::scale, Annotation::legend});
->>>>>>> 248e4517e047b171f8bcc2361ed1894350a6f9b8
+  std::vector<Annotation> usual{Annotation::scale};
+  if (paths.color.legend || !given(json, "/integrator/color/legend")) usual.push_back(Annotation::legend);
+  default_annotations(scene, json, usual);
   if (scene.bending.settings.max_steps > 1'000'000)
     source.fail("`/bending/max_steps` must be at most 1e6 with path_tracing, which keeps every step of a path");
   check_memory(scene.camera.resolution.cast<double>().prod() *

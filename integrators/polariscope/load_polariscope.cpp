@@ -33,7 +33,8 @@ Spectrum read_coefficients(const std::filesystem::path& file, const LightDescrip
 
 /// The integral of the secondary principal difference that 99 of 100 rays through the field do not exceed.
 double greatest_integral(const Scene& scene, PolarizedLight light) {
-  const Geometry volume({scene.geometry.surfaces().bounds, scene.geometry.surfaces().cut, std::nullopt, {}});
+  const Surfaces& surfaces = scene.geometry.surfaces();
+  const Geometry volume({surfaces.bounds, surfaces.cut, std::nullopt, surfaces.obstacles});
   const Beam beam = silhouette_beam(scene.field.corners(), light.direction, light.up);
   const auto [near, far] = depth_range(scene.field, beam.center, beam.direction);
   light.bands.clear();
@@ -47,12 +48,8 @@ double greatest_integral(const Scene& scene, PolarizedLight light) {
   std::vector<float> integrals;
   for (const LightRow& row : rows)
     for (const PolarPoint& point : row.points)
-<<<<<<< HEAD
       if (point.length > 0) integrals.push_back(static_cast<float>(point.integral / 2));
   return greatest_of_most(integrals) / light.strength;
-=======
-      if (point.length > 0) integrals.push_back(point.integral / 2);
-  return greatest_of_most(integrals);
 }
 
 /// Metres in a unit of length; 1 if it is empty, or of another name.
@@ -63,19 +60,14 @@ double metres_in(const std::string& unit) {
   return found == units.end() ? 1 : found->second;
 }
 
-/// A number as it is printed, so that a scene can have the same.
-double rounded(double value) {
-  const std::string text = fmt::format("{:.6g}", value);
-  std::from_chars(text.data(), text.data() + text.size(), value);  // In any locale.
-  return value;
->>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
-}
-
 double choose_coefficient(const Scene& scene, const PolarizedLight& light, double unit_length, double wavelength,
                           std::vector<std::string>& notes) {
   const Eigen::Vector3d& V = light.direction;
-  const std::string key =
+  std::string key =
       fmt::format("stress_optic {} {} {} {} {}", V.x(), V.y(), V.z(), unit_length, scene.geometry.has_cut());
+  for (const TriangleMesh& obstacle : scene.geometry.surfaces().obstacles)
+    key += fmt::format(" {} {} {}", obstacle.triangles.size(), obstacle.bounds().min().norm(),
+                       obstacle.bounds().max().norm());
   std::shared_ptr<const double> known = scene.kept ? scene.kept->find<double>(key) : nullptr;
   const double integral = known ? *known : scene.field.max_norm() > 0 ? greatest_integral(scene, light) : 0;
   if (scene.kept && !known) scene.kept->keep(key, integral, sizeof integral);
@@ -145,22 +137,15 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
   } else {
     loaded.stress_optic = choose_coefficient(scene, light, unit_length, wavelength, notes);
   }
-<<<<<<< HEAD
-  light.strength = pi * loaded.stress_optic * settings.unit_length / (wavelength * nanometre);
+  light.strength = pi * loaded.stress_optic * unit_length / (wavelength * nanometre);
   if (!std::isfinite(static_cast<float>(light.strength * scene.field.max_norm())))
-    throw std::runtime_error("`/integrator/stress_optic` times the field is beyond single precision; check its units");
-  loaded.arrangement = turned(settings.arrangement, settings.angle, settings.analyzer);
-=======
-  if (!std::isfinite(static_cast<float>(loaded.stress_optic * unit_length * scene.field.max_norm())))
     throw std::runtime_error("`/integrator/stress_optic` times the field is beyond single precision; check its units");
   loaded.order_note = fmt::format("1 order: {:g} nm", wavelength);
   if (!units.tensor.empty() && !units.length.empty())
     loaded.order_note +=
         fmt::format(", {:.3g} {} {}", wavelength * nanometre / std::abs(loaded.stress_optic * unit_length),
                     units.tensor, units.length);
-  light.strength = pi * loaded.stress_optic * unit_length / (wavelength * nanometre);
-  loaded.arrangement = turned(arrangement_of(settings.arrangement), settings.angle, settings.analyzer);
->>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
+  loaded.arrangement = turned(settings.arrangement, settings.angle, settings.analyzer);
   return loaded;
 }
 

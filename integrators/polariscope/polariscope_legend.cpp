@@ -7,44 +7,6 @@
 #include "renderer/charts/color_bar.h"
 
 namespace tensorray {
-<<<<<<< HEAD
-=======
-namespace {
-
-using Eigen::Vector2d;
-using Eigen::Vector3d;
-
-constexpr double cross_radius = 0.05;  // Of the picture's shorter side, ...
-constexpr double cross_place = 0.1;    // ... and its distance from the upper right corner.
-
-/// Draws a line through a point, and a letter at its end. @param angle  From u towards w, degrees.
-void draw_mark(Image& image, const Vector2d& center, double radius, double angle, const std::string& letter) {
-  const Vector2d along(std::cos(angle * pi / 180), -std::sin(angle * pi / 180));
-  const double height = letter_height(image.width, image.height), width = std::max(1.0, radius / 16);
-  const Vector2d end = center + (radius + height) * along;
-  const Vector2d lower_left = end + Vector2d(-text_width(letter, height) / 2, height / 2);
-  const Eigen::AlignedBox2d ground(center - Vector2d::Constant(1.5 * radius),
-                                   center + Vector2d::Constant(1.5 * radius));
-  const bool light = is_light(image, ground);
-  const Vector3d ink = Vector3d::Constant(light ? 0 : 1), edge = Vector3d::Constant(light ? 1 : 0);
-  for (const bool is_edge : {true, false}) {
-    draw_stroke(image, center - radius * along, center + radius * along, is_edge ? 3 * width : width,
-                is_edge ? edge : ink);
-    draw_text(image, lower_left, height, letter, is_edge ? edge : ink, is_edge ? width : 0);
-  }
-}
-
-void draw_cross(Image& image, const Arrangement& arrangement) {
-  const double side = std::min(image.width, image.height);
-  const Vector2d center(image.width - cross_place * side, cross_place * side);
-  const Element* const first = first_polarizer(arrangement.before);
-  const Element* const last = last_polarizer(arrangement.after);
-  if (first) draw_mark(image, center, cross_radius * side, first->angle, "P");
-  if (last) draw_mark(image, center, cross_radius * side, last->angle, "A");
-}
-
-}  // namespace
->>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
 
 std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const LoadedLightOfPolariscope& loaded,
                                                        double greatest) {
@@ -77,14 +39,9 @@ std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const
   };
   return [=](Image& image, double exposure) {
     const double gain = std::exp2(exposure);
-<<<<<<< HEAD
-    draw_color_bar(image, {"nm", range, [&](double position) -> Eigen::Vector3d { return gain * color(position); }});
+    draw_color_bar(
+        image, {"retardance\nnm", range, [&](double position) -> Eigen::Vector3d { return gain * color(position); }});
     draw_directions(image, directions);
-=======
-    draw_color_bar(image,
-                   {"retardance\nnm", range, [&](double position) -> Vector3d { return gain * color(position); }});
-    draw_cross(image, arrangement);
->>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
   };
 }
 

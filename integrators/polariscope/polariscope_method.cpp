@@ -160,12 +160,8 @@ Render LoadedPolariscope::render_of(const Scene& scene, Image picture) const {
                      {"tensorray:wavelength", fmt::format("{:.17g}", loaded_.wavelength)}};
   if (scene.description.output.wants(Annotation::legend)) {
     const double shown = greatest_of_most(integrals);
-<<<<<<< HEAD
     result.draw_legend = polariscope_legend(scene, loaded_, shown > 0 ? shown : loaded_.wavelength);
-=======
-    result.draw_legend = polariscope_legend(scene, loaded_, settings_, shown > 0 ? shown : loaded_.wavelength);
     result.legend_note = loaded_.order_note;
->>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
   }
   result.describe_pixel = [wavelength = loaded_.wavelength](const float* pixel) {
     return std::vector<std::pair<std::string, std::string>>{

@@ -24,15 +24,9 @@ TENSORRAY_VALUE(StressOptic);
 struct PolariscopeDescription {
   Arrangement arrangement = named_arrangements().front().elements;
   double angle = 0, analyzer = 0;  ///< Degrees.
-<<<<<<< HEAD
   StressOptic stress_optic = OpticChoice::automatic;
-  double unit_length = 1;      ///< Metres in a unit of world space.
-  std::optional<int> samples;  ///< Of a pixel along x and y; none: 2.
-=======
-  StressOpticDescription stress_optic = OpticChoice::automatic;
   std::optional<double> unit_length;  ///< Metres in a unit of world space; none: by the scene's unit, or 1.
   std::optional<int> samples;         ///< Of a pixel along x and y; none: 2.
->>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
 };
 
 inline void describe(PolariscopeDescription& settings, KeyVisitor& visit) {

@@ -178,7 +178,6 @@ void draw_axes(Image& image, const Vector3d& right, const Vector3d& up) {
   draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
 }
 
-<<<<<<< HEAD
 void draw_directions(Image& image, const std::vector<std::pair<std::string, double>>& directions) {
   const Sizes sizes(image);
   const double from_corner = sizes.margin + 4 * sizes.letter;
@@ -191,7 +190,8 @@ void draw_directions(Image& image, const std::vector<std::pair<std::string, doub
     marks.push_back({center + 1.5 * tip + corner, {}, text, sizes.letter});
   }
   if (!marks.empty()) draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
-=======
+}
+
 std::string anatomical_letters(const Vector3d& direction) {
   std::array<int, 3> axes{0, 1, 2};
   std::sort(axes.begin(), axes.end(), [&](int a, int b) { return std::abs(direction[a]) > std::abs(direction[b]); });
@@ -210,7 +210,6 @@ void draw_anatomy(Image& image, const Vector3d& right, const Vector3d& up, int r
     shift((size + side.cwiseProduct(free)) / 2 - extent_of(marks).center(), marks);
     draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
   }
->>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
 }
 
 void draw_outline(Image& image, const std::vector<OutlineStroke>& strokes, bool visible, bool hidden) {

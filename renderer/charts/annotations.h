@@ -37,22 +37,13 @@ void draw_caption(Image& image, const std::string& text);
 /// @param right, up  Directions of the picture in the world; unit, normal to each other.
 void draw_axes(Image& image, const Eigen::Vector3d& right, const Eigen::Vector3d& up);
 
-<<<<<<< HEAD
 /// Draws lines through one point in the upper right corner, each with a text at one end, and its angle from right to
 /// up, degrees.
 void draw_directions(Image& image, const std::vector<std::pair<std::string, double>>& directions);
 
-/// Colours from left to right, and what they mean.
-struct ColorStrip {
-  std::string left, right;                       ///< What stands before and behind them. May be empty.
-  std::function<Eigen::Vector3d(double)> color;  ///< At a position from 0 to 1, in the colour space of the picture.
-  std::string note;                              ///< A line below. May be empty.
-};
-=======
 /// The letters of a direction of a patient in RAS: R, L (right, left: +x, -x), A, P (anterior, posterior: y), S, I
 /// (superior, inferior: z). A direction between them has several letters, the nearest one first.
 std::string anatomical_letters(const Eigen::Vector3d& direction);
->>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
 
 /// Draws them at the four edges. @param room  Pixels at the right of the picture that belong to a legend.
 void draw_anatomy(Image& image, const Eigen::Vector3d& right, const Eigen::Vector3d& up, int room);

@@ -146,12 +146,8 @@ LoadedField prepare_field(const BlockSource& blocks, FieldChoices choices, const
   const double kept = before > 0 ? variation(grid) / before : 1;
   MadeField made = make_field(source_of(std::move(grid)), choices.eigenvalues, choices.interpolant);
   made.non_finite += non_finite;
-<<<<<<< HEAD
   if (choices.noise) made.resolution = {};  // Noise is never resolved.
-  LoadedField loaded = with_notes(std::move(made), source);
-=======
   LoadedField loaded = with_notes(std::move(made), source, units_in(blocks.metadata));
->>>>>>> ccc9ac2a589940ffbb29261ea0f004f96d66b2bc
   if (choices.noise) loaded.notes.push_back("field: its noise alone, in random order, and no structure");
   if (choices.smoothing > 0)
     loaded.notes.push_back(

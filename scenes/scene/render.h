@@ -77,13 +77,10 @@ struct Render {
   /// Draws a legend at the right of a scene-linear picture whose exposure is so many stops (of `display`: over it);
   /// empty: no legend.
   std::function<void(Image&, double exposure)> draw_legend;
-<<<<<<< HEAD
   int legend_room = 0;      ///< Pixels of the picture at the right that are the legend's; 0: it is beside the picture.
   std::string legend_note;  ///< A line below; may be empty.
-=======
   /// Whether a pixel of `linear` is hatched, as far as it is transparent; empty: none is.
   std::function<bool(const float* pixel)> is_hatched;
->>>>>>> 248e4517e047b171f8bcc2361ed1894350a6f9b8
   Statistics statistics;
   std::vector<std::string> notes;     ///< What the picture shows, for the user; one line each.
   std::vector<std::string> warnings;  ///< Problems that the picture does not show by itself; one line each.
