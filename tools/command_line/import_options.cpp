@@ -120,13 +120,4 @@ std::string flags_of(const ImportChoices& choices) {
   return flags;
 }
 
-double part_of(const std::string& text, const std::string& option) {
-  double value = 0;
-  const bool is_percent = !text.empty() && text.back() == '%';
-  if (!CLI::detail::lexical_cast(is_percent ? text.substr(0, text.size() - 1) : text, value) || !(value >= 0) ||
-      !(value *= is_percent ? 0.01 : 1.0, value <= 1))
-    throw std::invalid_argument(option + " " + escaped(text) + ": give a part, as 1% or 0.01");
-  return value;
-}
-
 }  // namespace tensorray

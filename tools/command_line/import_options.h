@@ -25,7 +25,4 @@ void add_field_options(CLI::App& command, ImportChoices& choices, std::vector<st
 /// The options as they were given, each after a blank.
 std::string flags_of(const ImportChoices& choices);
 
-/// A part of a whole, as 1% or 0.01. @throw std::invalid_argument if it is none, or not from 0 to 1.
-double part_of(const std::string& text, const std::string& option);
-
 }  // namespace tensorray

@@ -109,7 +109,8 @@ TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
   EXPECT_EQ(report.active, 5u * 6u * 7u);
 
   // A voxel of another size than the body's parts becomes smaller: the field has the faces, and no more.
-  for (const auto& [voxel, size] : {std::pair(0.3, Vector3i(8, 5, 3)), {0.667, {4, 3, 2}}, {2.0, {2, 2, 2}}}) {
+  for (const auto& [voxel, size] :
+       {std::pair(0.3, Vector3i(8, 5, 3)), {0.667, Vector3i(4, 3, 2)}, {2.0, Vector3i(2, 2, 2)}}) {
     settings.resolution = voxel;
     const TensorGrid grid = sampled(*mesh, settings, report);
     EXPECT_EQ(report.size, size);

@@ -262,7 +262,8 @@ TEST(Gltf, PicturesOfTheBaseColourMove) {
   std::string numbers(36, '\0');
   for (const std::size_t corner : {1, 2}) numbers.replace(16 * corner, 4, std::string("\0\0\x80\x3f", 4));
   numbers += std::string(24, '\0');  // Places of another picture.
-  for (const float place : {0, 0, 1, 0, 0, 1}) numbers.append(reinterpret_cast<const char*>(&place), sizeof place);
+  for (const float place : {0.0F, 0.0F, 1.0F, 0.0F, 0.0F, 1.0F})
+    numbers.append(reinterpret_cast<const char*>(&place), sizeof place);
   const std::string transform = R"("extensions": {"KHR_texture_transform": {"offset": [0, 1], "scale": [0.5, 0.5],
       "rotation": 1.57079632679, "texCoord": 1}})";
   using Places = std::vector<Eigen::Vector2f>;
@@ -294,7 +295,7 @@ TEST(Ply, TextureCoordinatesOfVerticesAndOfCorners) {
                                       "vertex_indices\n" + of_face + "end_header\n" + rows);
     return read_mesh_with_normals(file.path(), {});
   };
-  for (const std::string& names : {"uv", "st"})
+  for (const std::string names : {"uv", "st"})
     for (const char* prefix : {"", "texture_"}) {
       std::string properties;
       for (const char name : names) properties += std::string("property float ") + prefix + name + "\n";
