@@ -137,7 +137,9 @@ TEST(Annotations, ShowBodies) {
     with.text = json.dump();
     const Rendered plain = rendered(with, Json::array()), visible = rendered(with, "body");
     EXPECT_EQ(visible.display.pixels != plain.display.pixels, has_lines) << method.name;
-    if (has_lines) EXPECT_EQ(rendered(with, nullptr).display.pixels, visible.display.pixels) << method.name;
+    if (has_lines) {
+      EXPECT_EQ(rendered(with, nullptr).display.pixels, visible.display.pixels) << method.name;
+    }
     EXPECT_EQ(visible.render.linear.pixels, plain.render.linear.pixels) << method.name;
     EXPECT_EQ(visible.render.warnings.size() - plain.render.warnings.size(), has_lines ? 0u : 1u) << method.name;
   }

@@ -105,7 +105,9 @@ TEST_F(Lens, IsHatchedWhereNoLightArrives) {
   for (std::size_t i = 0; i < alpha.size(); ++i) {
     const bool is_gap = i % 97 == 48, sees = alpha[i] == 1;
     EXPECT_EQ(hatched[i], is_gap ? 0 : 1) << i;
-    if (sees || alpha[i] == 0) EXPECT_EQ(empty[i], sees ? 1 : 0) << i;
+    if (sees || alpha[i] == 0) {
+      EXPECT_EQ(empty[i], sees ? 1 : 0) << i;
+    }
   }
   EXPECT_NEAR(sum(alpha), 2 * 20 * 20, 1);  // Of 48 × 32 pixels of 0.05.
 }

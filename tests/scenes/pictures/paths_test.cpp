@@ -221,7 +221,7 @@ Path path_of(double wavelength, double aside) {
 std::vector<std::vector<Vector3d>> colors_of(const std::vector<Path>& paths, double radius) {
   PathColorDescription description;
   description.by = PathColor::wavelength;
-  return path_colors(description, paths, radius).of_points;
+  return path_colors(description, paths, radius, {}).of_points;
 }
 
 /// Where paths of one seed lie in one another they have one colour, so that it does not matter which is seen.

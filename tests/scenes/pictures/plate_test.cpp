@@ -342,7 +342,9 @@ TEST(UndisturbedLight, IsBesideLightThatIsDisplaced) {
     // All light that is emitted, but for that of the sides, lands or misses the plate.
     const double emitted =
         light.statistics.power.empty() ? 0 : light.statistics.beam_power * share(light, RayEnd::side);
-    if (density == "mesh") EXPECT_NEAR(emitted, 3 * 2 * x / 3, 0.05);
+    if (density == "mesh") {
+      EXPECT_NEAR(emitted, 3 * 2 * x / 3, 0.05);
+    }
     EXPECT_NEAR(std::accumulate(light.linear.pixels.begin(), light.linear.pixels.end(), 0.0) / 3 * pixel * pixel,
                 64 - 2 * x, 0.1)
         << density;

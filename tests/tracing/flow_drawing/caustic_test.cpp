@@ -142,7 +142,8 @@ TEST(Caustic, ASpectrumHasItsClosedFormWhateverItsEndsMeet) {
     FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(left + width * at.x(), 40 * at.y()); });
     std::vector<Eigen::Vector2f> landings;
     for (const Eigen::Vector2f& at : map.landings)
-      for (int sample = 0; sample < 3; ++sample) landings.emplace_back(at + Eigen::Vector2f(sample * float(way), 0));
+      for (int sample = 0; sample < 3; ++sample)
+        landings.emplace_back(at + Eigen::Vector2f(float(sample) * float(way), 0));
     map.landings = landings;
     map.wavelengths = 3;
     map.ends.assign(landings.size(), RayEnd::plate);
