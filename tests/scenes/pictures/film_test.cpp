@@ -207,7 +207,7 @@ TEST_F(FilmScene, WhatIsToldHasTheAxesOfTheFile) {
   EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("light: along [0, -1, 0]")));
   EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("`/output/exr_type` has no effect")));
   render_all({}, {"maps.nrrd"});
-  EXPECT_THAT(read_file(in_folder("maps.nrrd")), ::testing::HasSubstr("(0,0,-0.3125)"));
+  EXPECT_THAT(read_file(in_folder("maps.nrrd")), ::testing::HasSubstr("(0,0,-0.25)"));
   const Render stretch = render_all({"integrator.type=stretch", "light.direction=[0,-1,0]"});
   EXPECT_EQ(stretch.metadata.at("tensorray:direction"), "0 -1 0");
 }
