@@ -62,6 +62,8 @@ struct FlowPieces {
 
 constexpr std::size_t group_size = 512;  // Triangles; their landings stay in the cache while they are drawn.
 constexpr Detail max_detail = 15;
+constexpr Detail max_partial_detail = 5;  // Of light that does not always end on the same thing: most moves far beside
+                                          // the plate.
 
 /// How the light of a vertex moves over the plate.
 struct Movement {
@@ -93,8 +95,8 @@ Movement movement_of(const FlowMap& map, std::size_t vertex) {
 }
 
 /// @param steps  The steps that light moves within each band.
-Detail detail_for(double steps, Detail least) {
-  if (steps > 1) return static_cast<Detail>(std::min<double>(std::ceil(steps) - 1, max_detail));
+Detail detail_for(double steps, Detail least, Detail greatest) {
+  if (steps > 1) return static_cast<Detail>(std::min<double>(std::ceil(steps) - 1, greatest));
   Detail detail = 0;
   while (detail > least && std::ldexp(steps, 1 - detail) <= 1) --detail;
   return detail;
@@ -213,7 +215,9 @@ FlowPieces divide_map(const FlowMap& map, double steps, std::size_t bands) {
   std::vector<std::int8_t> of_vertex(map.starts.size());
   tbb::parallel_for(std::size_t{0}, map.starts.size(), [&](std::size_t i) {
     const Movement movement = movement_of(map, i);
-    of_vertex[i] = static_cast<std::int8_t>(detail_for(steps * movement.fastest, movement.is_same ? least : 0));
+    const double within = steps * movement.fastest;
+    of_vertex[i] = static_cast<std::int8_t>(movement.is_same ? detail_for(within, least, max_detail)
+                                                             : detail_for(within, 0, max_partial_detail));
   });
   for (const FlowTriangle& triangle : map.triangles) {
     const auto& [a, b, c] = triangle.corners;

@@ -44,9 +44,10 @@ struct CausticSettings {
 };
 
 /// Draws each triangle once for each `step` by which its light moves, from the first band to the last. Where light
-/// moves little and always ends on the same thing, several bands in a row are drawn as one; where it moves far, a band
-/// is drawn at most 16 times. If not all corners of a triangle land, each corner takes a third of the light, and leaves
-/// it where it lands. So do those of small triangles at a tear. What lands beside the plate counts as missed.
+/// moves little and always ends on the same thing, several bands in a row are drawn as one; where it moves far, a
+/// band is drawn at most 16 times (6, if it does not always end on the same thing). If not all corners of a
+/// triangle land, each corner takes a third of the light, and leaves it where it lands. So do those of small
+/// triangles at a tear. What lands beside the plate counts as missed.
 /// @param plate  The plate of the map.
 /// @param bands  In the order of their places, without gaps between those that have a width.
 /// The sums are integers, so that the result is the same for any number of threads and ranks; only the root has it.

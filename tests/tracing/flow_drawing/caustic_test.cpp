@@ -135,15 +135,17 @@ TEST(Caustic, ASpectrumHasItsClosedFormWhateverItsEndsMeet) {
   constexpr double left = 5, width = 5, way = 41;
   constexpr int count = 20;
   std::vector<CausticBand> bands(count);
-  for (int i = 0; i < count; ++i) bands[i] = {(i + 0.5) / count, 1.0 / count, 0, 1.0 / count};
+  for (int i = 0; i < count; ++i) {
+    bands[i].sample = (i + 0.5) / count;
+    bands[i].width = bands[i].weight = 1.0 / count;
+  }
   const auto integral = [](double x) { return x <= 0 ? 0 : x < width ? x * x / 2 / width : x - width / 2; };
   const auto before = [&](double x) { return (integral(x - left) - integral(x - left - way)) / way; };
   for (const RayEnd end : {RayEnd::plate, RayEnd::missed, RayEnd::obstacle}) {
     FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(left + width * at.x(), 40 * at.y()); });
     std::vector<Eigen::Vector2f> landings;
     for (const Eigen::Vector2f& at : map.landings)
-      for (int sample = 0; sample < 3; ++sample)
-        landings.emplace_back(at + Eigen::Vector2f(float(sample) * float(way), 0));
+      for (const float x : {0.0f, 1.0f, 2.0f}) landings.emplace_back(at.x() + x * static_cast<float>(way), at.y());
     map.landings = landings;
     map.wavelengths = 3;
     map.ends.assign(landings.size(), RayEnd::plate);
