@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -53,15 +54,25 @@ Reflection reflection_of(const Eigen::Affine3d& to_world, int world_axis) {
 /// A level and its mirror image.
 class MirroredLevel {
  public:
-  MirroredLevel(std::vector<BlockShape> shapes, Fill fill, const Reflection& reflection)
-      : half_(std::move(shapes)), fill_(std::move(fill)), reflection_(reflection) {
+  /// @param brick  Of a finer level, the voxels along an edge of the bricks that it refines; 0: the level is no such.
+  MirroredLevel(std::vector<BlockShape> shapes, Fill fill, const Reflection& reflection, int brick)
+      : half_(std::move(shapes)), fill_(std::move(fill)), reflection_(reflection), brick_(brick) {
     for (std::size_t i = 0; i < half_.size(); ++i) number_[key_of(half_[i].origin)] = i;
+    if (brick_ == 0) return;
+    for (const BlockShape& shape : half_) {
+      Vector3i place = brick_of(shape.origin);
+      refined_.insert(key_of(place));
+      place[reflection_.axis] = reflection_.sum / brick_ - 1 - place[reflection_.axis];
+      refined_.insert(key_of(place));
+    }
   }
 
   /// The shapes of the whole level.
   std::vector<BlockShape> shapes() const {
     std::map<Key, BlockShape> all;
     const auto add = [&](const Vector3i& voxel) {
+      // The image of the first face of a brick is that of the next one, which need not be refined.
+      if (brick_ > 0 && refined_.count(key_of(brick_of(voxel))) == 0) return;
       const Vector3i origin = origin_of(voxel);
       BlockShape& shape = all[key_of(origin)];
       shape.origin = origin;
@@ -98,6 +109,9 @@ class MirroredLevel {
   using Key = std::array<int, 3>;
 
   static Key key_of(const Vector3i& origin) { return {origin.x(), origin.y(), origin.z()}; }
+  Vector3i brick_of(const Vector3i& voxel) const {
+    return voxel.unaryExpr([this](int i) { return (i - (i % brick_ + brick_) % brick_) / brick_; });
+  }
   static Vector3i origin_of(const Vector3i& voxel) {
     return voxel.unaryExpr([](int i) { return i & ~(TensorBlock::size - 1); });
   }
@@ -115,6 +129,7 @@ class MirroredLevel {
       const Vector3i at = (is_image ? reflection_(voxel) : voxel) - block.origin;
       if ((at.array() < 0 || at.array() >= TensorBlock::size).any()) continue;
       const auto offset = static_cast<std::size_t>(TensorBlock::offset(at.x(), at.y(), at.z()));
+      if (!block.active[offset]) continue;
       const Eigen::Matrix3f& value = half.values[static_cast<std::size_t>(i)];
       const Eigen::Matrix3f wanted =
           is_image ? Eigen::Matrix3f(reflection_.of_world * value * reflection_.of_world) : value;
@@ -125,11 +140,13 @@ class MirroredLevel {
   std::vector<BlockShape> half_;
   Fill fill_;
   Reflection reflection_;
+  int brick_;
   std::map<Key, std::size_t> number_;
+  std::set<Key> refined_;  // The places of bricks, of the whole level.
 };
 
-void mirror_level(std::vector<BlockShape>& shapes, Fill& fill, const Reflection& reflection) {
-  const auto level = std::make_shared<MirroredLevel>(std::move(shapes), std::move(fill), reflection);
+void mirror_level(std::vector<BlockShape>& shapes, Fill& fill, const Reflection& reflection, int brick) {
+  const auto level = std::make_shared<MirroredLevel>(std::move(shapes), std::move(fill), reflection, brick);
   shapes = level->shapes();
   fill = [level](std::size_t, TensorBlock& block) { level->fill(block); };
 }
@@ -160,10 +177,13 @@ BlockSource with_mirror_image(BlockSource source) {
   if (entry == source.metadata.end()) return source;
   const int axis = axis_named(entry->second);
   Reflection reflection = reflection_of(source.to_world, axis);
-  mirror_level(source.shapes, source.fill, reflection);
+  if (!source.finer.empty() && reflection.sum % TensorBlock::size != 0)
+    throw std::invalid_argument(std::string("the plane of ") + mirror_key +
+                                " must be a face of the bricks of 8 voxels, as the field has finer levels");
+  mirror_level(source.shapes, source.fill, reflection, 0);
   for (BlockLevel& level : source.finer) {
     reflection.sum *= 2;
-    mirror_level(level.shapes, level.fill, reflection);
+    mirror_level(level.shapes, level.fill, reflection, 2 * TensorBlock::size);
   }
   source.surface = with_mirror_image(source.surface, axis);
   source.metadata[mirrored_key] = entry->second;

@@ -14,7 +14,8 @@ inline const char* const mirrored_key = "tensorray:mirrored";
 /// The field that `source.metadata` asks for: with its mirror image M T M, M = diag(1, −1, 1) across y; or as it is.
 /// Where both are, the value is their mean. Blocks are still made when they are needed, each from up to three. The
 /// surface of the body is mirrored, too, without triangles in the plane.
-/// @throw std::invalid_argument, one line: the axis is none, or the plane is neither at voxels nor half-way between.
+/// @throw std::invalid_argument, one line: the axis is none, or the plane is neither at voxels nor half-way between,
+/// or, of a field with finer levels, not on a face of its bricks.
 BlockSource with_mirror_image(BlockSource source);
 
 }  // namespace tensorray

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "tests/volumes/level_support.h"
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 namespace {
@@ -53,10 +55,22 @@ TEST(Mirror, GivesTheWholeFieldOnAllLevels) {
           ASSERT_EQ(a.size(), b.size()) << axis << shift << side << level;
           for (std::size_t i = 0; i < a.size(); ++i) {
             ASSERT_EQ(a[i].origin, b[i].origin);
-            ASSERT_EQ(a[i].active, b[i].active) << axis << shift << side << level << a[i].origin.transpose();
+            if (level == 0) {
+              ASSERT_EQ(a[i].active, b[i].active) << axis << shift << side << a[i].origin.transpose();
+            }
             for (std::size_t k = 0; k < TensorBlock::voxels; ++k)
-              ASSERT_LT((a[i].values[k] - b[i].values[k]).norm(), 1e-5);
+              if (a[i].active[k]) {
+                ASSERT_LT((a[i].values[k] - b[i].values[k]).norm(), 1e-5);
+              }
           }
+        }
+        // The image of a refined brick has no voxels on its first face: they change nothing in the field.
+        const TensorField field(view_of(got), {Interpolation::cubic, Border::extend}),
+            expected(view_of(all), {Interpolation::cubic, Border::extend});
+        TensorSampler sampler(field), of_expected(expected);
+        for (int i = 0; i < 2000; ++i) {
+          const Vector3d at = to_world * Vector3d(-15.9 + 0.0158 * i, -15 + std::fmod(0.37 * i, 30), 7 * std::sin(i));
+          ASSERT_LT((sampler.at(at) - of_expected.at(at)).norm(), 1e-5) << at.transpose();
         }
       }
 }
