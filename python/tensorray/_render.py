@@ -115,7 +115,11 @@ class Render:
         """Spectral irradiance (of the polariscope, radiance), unit of the light's irradiance per nm: float32, shape (height, width, bands). Needs
         keep=["spectral"]; else None."""
         spectral = self._rendered.spectral()
-        return None if spectral is None else spectral[0][:, :, -len(self.wavelengths):]
+        if spectral is None:
+            return None
+        bands, channels = len(self.wavelengths), spectral[0].shape[2]
+        first = 3 if channels >= 3 + 4 * bands else channels - bands  # S0 of Stokes' parameters.
+        return spectral[0][:, :, first:first + bands]
 
     @property
     def stokes(self) -> NDArray[np.float32] | None:
@@ -125,7 +129,7 @@ class Render:
         bands = 0 if spectral is None else len(self.wavelengths)
         if spectral is None or len(spectral[1]) < 3 + 4 * bands:
             return None
-        parts = [spectral[0][:, :, 3 + i * bands:3 + (i + 1) * bands] for i in (3, 0, 1, 2)]  # S0 is the last one.
+        parts = [spectral[0][:, :, 3 + i * bands:3 + (i + 1) * bands] for i in range(4)]
         return np.stack(parts, axis=-1)
 
     @functools.cached_property

@@ -180,7 +180,7 @@ Surfaces load_volume(const SceneDescription& description, const TensorField& fie
   if (const auto* mesh = std::get_if<std::filesystem::path>(&description.field.bounds))
     surfaces.cut = load_closed_mesh(description, *mesh);
   else if (ends_at_surface(description, field))
-    surfaces.cut = closed_surface(field.surface(), source_of(description));
+    surfaces.cut = closed_surface(field.surface(), description.field.file.string());
   return surfaces;
 }
 

@@ -151,7 +151,8 @@ class RendersTest(unittest.TestCase):
         np.testing.assert_allclose(np.linalg.norm(photons["direction"], axis=1), 1, rtol=1e-5)
         self.assertEqual(set(photons["wavelength"]), set(picture.wavelengths.astype("f4")))
         power = picture.statistics["power"]
-        self.assertAlmostEqual(power["emitted"] / 4, 1, places=6)  # The beam's area is 4, its irradiance 1.
+        # The plate is 2 x 2, the beam wider by an eighth, and its irradiance 1.
+        self.assertAlmostEqual(power["emitted"] / 2.25**2, 1, places=6)
         self.assertEqual(picture._repr_png_()[:8], b"\x89PNG\r\n\x1a\n")
         for array in (picture.linear, photons, picture.spectral):
             with self.assertRaises(ValueError):
