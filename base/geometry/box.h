@@ -2,7 +2,10 @@
 /// @file base/geometry/box.h
 /// Boxes along the axes, and points.
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -24,6 +27,23 @@ inline std::vector<Eigen::Vector3d> corners_of(const Eigen::AlignedBox3d& box,
   for (int i = 0; i < 8; ++i)
     corners.push_back(transform * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
   return corners;
+}
+
+/// Where the line at `from` + t `along` is in a box: from t = `first` to t = `second`; nowhere if they do not rise.
+inline std::pair<double, double> section_in(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& from,
+                                            const Eigen::Vector3d& along) {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  double begin = -infinite, end = infinite;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = box.min()[axis] - from[axis], high = box.max()[axis] - from[axis];
+    if (along[axis] != 0) {
+      begin = std::max(begin, std::min(low / along[axis], high / along[axis]));
+      end = std::min(end, std::max(low / along[axis], high / along[axis]));
+    } else if (!(low <= 0 && high >= 0)) {
+      return {infinite, -infinite};
+    }
+  }
+  return {begin, end};
 }
 
 // The smallest rotation that turns one direction to another.

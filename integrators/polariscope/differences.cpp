@@ -13,24 +13,6 @@
 // Must come after foreach_target.h:
 #include <hwy/highway.h>
 
-#ifndef TENSORRAY_INTEGRATORS_DIFFERENCES
-#define TENSORRAY_INTEGRATORS_DIFFERENCES
-namespace tensorray {
-namespace {
-
-/// The cells that points may be in, and how they are found; along each axis.
-struct CellBox {
-  double along[3];   ///< Of the rays, index space.
-  double first[3];   ///< Index space.
-  double extent[3];  ///< Voxels of level 0.
-  double scale;      ///< Cells in a voxel of level 0.
-  std::int32_t last[3];
-};
-
-}  // namespace
-}  // namespace tensorray
-#endif
-
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::HWY_NAMESPACE {
 namespace {

@@ -13,6 +13,15 @@
 
 namespace tensorray {
 
+/// The cells that points may be in, and how they are found; along each axis.
+struct CellBox {
+  double along[3];   ///< Of the rays, index space.
+  double first[3];   ///< Index space.
+  double extent[3];  ///< Voxels of level 0.
+  double scale;      ///< Cells in a voxel of level 0.
+  std::int32_t last[3];
+};
+
 /// One thread's. It keeps the bricks that it converted last.
 class DifferenceSampler {
  public:

@@ -29,8 +29,6 @@ Matrix4d mueller_matrix(const std::vector<Element>& elements, double wavelength)
   return product;
 }
 
-bool is_polarizer(const Element& element) { return element.kind == ElementKind::polarizer; }
-
 }  // namespace
 
 const std::vector<NamedArrangement>& named_arrangements() {
@@ -44,13 +42,9 @@ const std::vector<NamedArrangement>& named_arrangements() {
   return all;
 }
 
-const Element* first_polarizer(const std::vector<Element>& elements) {
-  const auto found = std::find_if(elements.begin(), elements.end(), is_polarizer);
-  return found == elements.end() ? nullptr : &*found;
-}
-
 const Element* last_polarizer(const std::vector<Element>& elements) {
-  const auto found = std::find_if(elements.rbegin(), elements.rend(), is_polarizer);
+  const auto found = std::find_if(elements.rbegin(), elements.rend(),
+                                  [](const Element& each) { return each.kind == ElementKind::polarizer; });
   return found == elements.rend() ? nullptr : &*found;
 }
 

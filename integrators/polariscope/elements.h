@@ -31,8 +31,7 @@ struct NamedArrangement {
 };
 const std::vector<NamedArrangement>& named_arrangements();
 
-/// The first, or the last, polariser of a list; null if it has none.
-const Element* first_polarizer(const std::vector<Element>& elements);
+/// The last polariser of a list; null if it has none.
 const Element* last_polarizer(const std::vector<Element>& elements);
 
 /// All elements turned by `angle`, and the last polariser by `analyzer` more; degrees.

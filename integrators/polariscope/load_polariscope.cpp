@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
+#include "renderer/charts/annotations.h"
+#include "renderer/charts/color_bar.h"
 #include "scenes/scene/kept_results.h"
 
 namespace tensorray {
@@ -50,14 +51,6 @@ double greatest_integral(const Scene& scene, PolarizedLight light) {
     for (const PolarPoint& point : row.points)
       if (point.length > 0) integrals.push_back(static_cast<float>(point.integral / 2));
   return greatest_of_most(integrals) / light.strength;
-}
-
-/// Metres in a unit of length; 1 if it is empty, or of another name.
-double metres_in(const std::string& unit) {
-  static const std::map<std::string, double> units{{"nm", 1e-9}, {"um", 1e-6}, {"mm", 1e-3},   {"cm", 1e-2},
-                                                   {"m", 1},     {"km", 1e3},  {"in", 0.0254}, {"ft", 0.3048}};
-  const auto found = units.find(unit);
-  return found == units.end() ? 1 : found->second;
 }
 
 double choose_coefficient(const Scene& scene, const PolarizedLight& light, double unit_length, double wavelength,
@@ -147,6 +140,42 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
                     units.tensor, units.length);
   loaded.arrangement = turned(settings.arrangement, settings.angle, settings.analyzer);
   return loaded;
+}
+
+std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const LoadedLightOfPolariscope& loaded,
+                                                       double greatest) {
+  std::vector<MeanLight> analyses;
+  std::vector<double> relative;
+  for (const Band& band : loaded.light.bands) {
+    analyses.push_back(analyses_of(loaded.arrangement, band.wavelength)[0]);
+    relative.push_back(loaded.light.relative(band.wavelength));
+  }
+  const auto& [before, after] = loaded.arrangement;
+  const auto is_retarder = [](const Element& element) { return element.kind == ElementKind::retarder; };
+  const bool has_sign =
+      std::any_of(before.begin(), before.end(), is_retarder) || std::any_of(after.begin(), after.end(), is_retarder);
+  const Element *const polarizer = last_polarizer(before), *const analyzer = last_polarizer(after);
+  std::vector<std::pair<std::string, double>> directions;
+  if (polarizer) directions.emplace_back("P", polarizer->angle);
+  if (analyzer) directions.emplace_back("A", analyzer->angle);
+  const double twice = ((polarizer ? polarizer->angle : 0) + 45) * pi / 90;
+  const Eigen::Vector2d axis(std::cos(twice), std::sin(twice));  // The slow one.
+  const ValueRange range{has_sign ? -greatest : 0, greatest};
+  const auto color = [=, colors = band_colors(scene), wavelength = loaded.wavelength](double position) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < analyses.size(); ++k) {
+      const double half = pi * range.value(position) / wavelength * relative[k];
+      const Eigen::Quaterniond plate(std::cos(half), std::sin(half) * axis.x(), std::sin(half) * axis.y(), 0);
+      sum += analyses[k].dot(light_of(plate)) * colors.col(static_cast<Eigen::Index>(k));
+    }
+    return sum;
+  };
+  return [=](Image& image, double exposure) {
+    const double gain = std::exp2(exposure);
+    draw_color_bar(
+        image, {"retardance\nnm", range, [&](double position) -> Eigen::Vector3d { return gain * color(position); }});
+    draw_directions(image, directions);
+  };
 }
 
 }  // namespace tensorray

@@ -35,8 +35,8 @@ Eigen::Matrix3Xd band_colors(const Scene& scene);
 double greatest_of_most(std::vector<float>& values);
 
 /// The interference colours of the scene's light, from 0 to a retardance (nm, at the reference wavelength) of a plate
-/// that is turned by 45° against the first polariser, and a cross of the polarisers' directions: P the first one, A the
-/// analyser. For Render::draw_legend. @param greatest  Finite, > 0.
+/// that is turned by 45° against the polariser, and a cross of directions: P the polariser, A the analyser. For
+/// Render::draw_legend. @param greatest  Finite, > 0.
 std::function<void(Image&, double exposure)> polariscope_legend(const Scene& scene,
                                                                 const LoadedLightOfPolariscope& loaded,
                                                                 double greatest);

@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <limits>
 #include <memory>
 
 #include <tbb/enumerable_thread_specific.h>
 
 #include "base/constants.h"
+#include "base/geometry/box.h"
 #include "integrators/polariscope/differences.h"
 #include "integrators/polariscope/turning.h"
 
@@ -25,19 +24,6 @@ constexpr int most_sections = 10000;           // Of a ray in the body: a limit 
 struct RayStep {
   double middle, length;
 };
-
-/// From where to where a ray is in a box; the plate is at 0.
-std::pair<double, double> section_of(const Eigen::AlignedBox3d& box, const Vector3d& origin, const Vector3d& along) {
-  double begin = -std::numeric_limits<double>::infinity(), end = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double low = box.min()[axis] - origin[axis], high = box.max()[axis] - origin[axis];
-    if (along[axis] == 0 && (low > 0 || high < 0)) return {0, 0};
-    if (along[axis] == 0) continue;
-    begin = std::max(begin, std::min(low / along[axis], high / along[axis]));
-    end = std::min(end, std::max(low / along[axis], high / along[axis]));
-  }
-  return {begin, end};
-}
 
 }  // namespace
 
@@ -101,7 +87,8 @@ void PolarTracer::find_steps(Ray& ray) const {
     ray.is_lit = !hit || hit->surface != Surface::obstacle;
   }
   if (!ray.is_lit) return;
-  const auto [begin, end] = section_of(field_.index_bounds(), ray.index, across_);
+  const auto [begin, leaves] = section_in(field_.index_bounds(), ray.index, across_);
+  const double end = std::min(leaves, 0.0);  // The plate is at 0.
   if (!(end > begin)) return;
   const auto add_steps = [&](double from, double to) {
     if (!(to > from)) return;
@@ -157,7 +144,7 @@ void PolarTracer::add(std::size_t lane, float weight, std::size_t x, Packet& pac
     return;
   }
   PolarPoint& point = row.points[x];
-  point.integral += 2 * ray.phase;
+  point.integral += std::copysign(2 * ray.phase, light_.strength);
   point.length += ray.length;
   ++packet.sums[x].inside;
   if (room_ == 0) return;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <system_error>
 
 #include <fmt/format.h>
 
@@ -83,11 +82,11 @@ SpectralImage spectral_picture(const PolarPicture& picture, const Scene& scene) 
   return result;
 }
 
-/// The integrals of the picture's pixels in the field, nm.
+/// The magnitudes of the integrals of the picture's pixels in the field, nm.
 std::vector<float> integrals_of(const Image& image) {
   std::vector<float> values;
   for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
-    if (image.pixels[i + length_channel] > 0) values.push_back(image.pixels[i + integral_channel]);
+    if (image.pixels[i + length_channel] > 0) values.push_back(std::abs(image.pixels[i + integral_channel]));
   return values;
 }
 
@@ -164,10 +163,10 @@ Render LoadedPolariscope::render_of(const Scene& scene, Image picture) const {
     result.legend_note = loaded_.order_note;
   }
   result.describe_pixel = [wavelength = loaded_.wavelength](const float* pixel) {
+    const double n = std::abs(pixel[integral_channel]) / wavelength, axis = slow_axis(n, pixel[azimuth_channel]);
     return std::vector<std::pair<std::string, std::string>>{
-        {"order", fmt::format("{:.3f} at {:.1f} nm", pixel[integral_channel] / wavelength, wavelength)},
-        {"slow axis", fmt::format("{:.1f} degrees",
-                                  slow_axis(pixel[integral_channel] / wavelength, pixel[azimuth_channel]) * 180 / pi)}};
+        {"order", fmt::format("{:.3f} at {:.1f} nm", n, wavelength)},
+        {"slow axis", fmt::format("{:.1f} degrees", axis * 180 / pi)}};
   };
   return result;
 }

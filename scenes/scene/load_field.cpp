@@ -1,4 +1,5 @@
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -111,6 +112,13 @@ FieldUnits units_of(const Scene& scene) {
   if (description.field.derive != Derive::none) units.tensor.clear();  // The file's is that of what is derived.
   if (!description.field.unit.empty()) units.tensor = description.field.unit;
   return units;
+}
+
+double metres_in(const std::string& unit) {
+  static const std::map<std::string, double> units{{"nm", 1e-9}, {"um", 1e-6}, {"mm", 1e-3},   {"cm", 1e-2},
+                                                   {"m", 1},     {"km", 1e3},  {"in", 0.0254}, {"ft", 0.3048}};
+  const auto found = units.find(unit);
+  return found == units.end() ? 1 : found->second;
 }
 
 FieldChoices choices_of(const SceneDescription& description) {

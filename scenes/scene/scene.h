@@ -78,6 +78,9 @@ struct LoadedField {
 /// The units that a scene names, else those of the field's file.
 FieldUnits units_of(const Scene& scene);
 
+/// Metres in a unit of length; 1 if it is empty, or of another name.
+double metres_in(const std::string& unit);
+
 /// What is made of a field's voxels.
 struct FieldChoices {
   double smoothing = 0;  ///< Deviation of a Gaussian, voxels; 0: none.
