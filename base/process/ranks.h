@@ -4,6 +4,7 @@
 /// it to the others. As in MPI, rank 0 is the root.
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -25,6 +26,12 @@ class Ranks {
 
   /// The same at the root; at the others, nothing. @throw as above.
   virtual std::vector<std::string> gather(const std::string& mine) = 0;
+
+  /// Replaces bytes at all other ranks by those of the root; all have the same count. @throw as above.
+  virtual void broadcast(void* bytes, std::size_t size) = 0;
+
+  /// Replaces numbers at all ranks by their sums; all have the same count. @throw as above.
+  virtual void sum(std::vector<std::uint64_t>& numbers) = 0;
 };
 
 /// In what follows, ranks may be null: this process is alone.
@@ -34,11 +41,7 @@ inline bool is_mine(const Ranks* ranks, std::size_t unit) { return !ranks || uni
 /// The root's value, at all ranks: a number, or a struct of them. @throw as Ranks::all_gather.
 template <class Value>
 Value broadcast(Ranks* ranks, Value value) {
-  if (!ranks) return value;
-  Archive mine;
-  if (is_root(ranks)) mine.copy(value);
-  const std::string root = ranks->all_gather(mine.take()).front();
-  Archive(root).copy(value);
+  if (ranks) ranks->broadcast(&value, sizeof value);
   return value;
 }
 
@@ -46,10 +49,8 @@ Value broadcast(Ranks* ranks, Value value) {
 template <class Values>
 void broadcast_list(Ranks* ranks, Values& values) {
   if (!ranks) return;
-  Archive mine;
-  if (is_root(ranks)) mine.copy_list(values);
-  const std::string root = ranks->all_gather(mine.take()).front();
-  if (!is_root(ranks)) Archive(root).copy_list(values);
+  values.resize(broadcast(ranks, values.size()));
+  ranks->broadcast(values.data(), values.size() * sizeof values[0]);
 }
 
 /// Gives the root what all others have, one after the other, so that it has the bytes of one at a time.

@@ -20,25 +20,25 @@ using Eigen::Vector3d;
 constexpr std::size_t most_wavelengths = 243;  // Of a band: a power of three, so that coarser divisions are part of it.
 constexpr int most_sections = 10000;           // Of a ray in the body: a limit that no body reaches.
 
-/// Middle of a step along its ray, from the plate, and its length.
-struct RayStep {
-  double middle, length;
-};
-
 }  // namespace
 
 struct PolarTracer::Ray {
   Vector3d origin, index;  // On the plate, in world and in index space.
-  std::vector<RayStep> steps;
-  double phase = 0, length = 0;  // Σ √(a² + b²) h, at the reference; Σ h.
+  std::size_t steps = 0;
+  double length = 0;  // Of all steps.
   bool is_lit = true;
 };
 
 /// Rays side by side.
 struct PolarTracer::Packet {
   std::array<Ray, ray_lanes> rays;
-  RaySteps steps;
+  struct Step {
+    double middle[ray_lanes] = {}, length[ray_lanes] = {};  // Along the rays, from the plate; 0: there is no step.
+  };
+  std::vector<Step> steps;
+  RaySteps sampled;
   std::vector<RayTurns> turns;
+  std::array<double, ray_lanes> phase;  // Σ √(a² + b²) h, of a relative strength of 1.
   std::vector<float> planes;
   /// Of each pixel: quaternions w, x, y, z; samples in the field.
   struct Sum {
@@ -76,10 +76,10 @@ PolarTracer::PolarTracer(const TensorField& field, const Geometry& geometry, con
   sampler_ = [samplers]() -> DifferenceSampler& { return samplers->local(); };
 }
 
-void PolarTracer::find_steps(Ray& ray) const {
+void PolarTracer::find_steps(std::size_t lane, Packet& packet) const {
+  Ray& ray = packet.rays[lane];
   const Vector3d& k = light_.direction;
   const Vector3d from_start = ray.origin - light_.start;
-  ray.is_lit = true;
   if (light_.aperture) ray.is_lit = light_.aperture->contains(Eigen::Vector2d(light_.aperture_axes * from_start));
   if (ray.is_lit && !geometry_.surfaces().obstacles.empty()) {
     const double way = from_start.dot(k);
@@ -93,7 +93,11 @@ void PolarTracer::find_steps(Ray& ray) const {
   const auto add_steps = [&](double from, double to) {
     if (!(to > from)) return;
     const double count = std::max(1.0, std::ceil((to - from) * steps_per_length_ - 1e-6)), length = (to - from) / count;
-    for (int i = 0; i < count; ++i) ray.steps.push_back({from + (i + 0.5) * length, length});
+    for (int i = 0; i < count; ++i, ++ray.steps) {
+      if (ray.steps == packet.steps.size()) packet.steps.emplace_back();
+      packet.steps[ray.steps].middle[lane] = from + (i + 0.5) * length;
+      packet.steps[ray.steps].length[lane] = length;
+    }
     ray.length += to - from;
   };
   if (!geometry_.has_cut()) return add_steps(begin, end);
@@ -112,24 +116,20 @@ void PolarTracer::find_steps(Ray& ray) const {
 /// Finds the turns and phases of all rays, step by step.
 void PolarTracer::sample(Packet& packet) const {
   DifferenceSampler& sampler = sampler_();
-  RaySteps& steps = packet.steps;
-  std::size_t most = 0;
-  for (std::size_t i = 0; i < ray_lanes; ++i) {
-    most = std::max(most, packet.rays[i].steps.size());
-    for (int axis = 0; axis < 3; ++axis) steps.origin[axis][i] = packet.rays[i].index[axis];
-  }
+  RaySteps& sampled = packet.sampled;
+  for (std::size_t i = 0; i < ray_lanes; ++i)
+    for (int axis = 0; axis < 3; ++axis) sampled.origin[axis][i] = packet.rays[i].index[axis];
+  packet.phase.fill(0);
   packet.turns.clear();
-  for (std::size_t step = 0; step < most; ++step) {
+  for (const Packet::Step& step : packet.steps) {
     for (std::size_t i = 0; i < ray_lanes; ++i) {
-      const Ray& ray = packet.rays[i];
-      const RayStep at = step < ray.steps.size() ? ray.steps[step] : RayStep{0, 0};
-      steps.place[0][i] = at.middle - gauss_point * at.length;
-      steps.place[1][i] = at.middle + gauss_point * at.length;
-      steps.length[i] = static_cast<float>(at.length);
+      sampled.place[0][i] = step.middle[i] - gauss_point * step.length[i];
+      sampled.place[1][i] = step.middle[i] + gauss_point * step.length[i];
+      sampled.length[i] = static_cast<float>(step.length[i]);
     }
-    sampler.sample(steps);
-    packet.turns.push_back(turns_of(steps));
-    for (std::size_t i = 0; i < ray_lanes; ++i) packet.rays[i].phase += packet.turns.back().phase[i] / greatest_;
+    sampler.sample(sampled);
+    const RayTurns& turns = packet.turns.emplace_back(turns_of(sampled));
+    for (std::size_t i = 0; i < ray_lanes; ++i) packet.phase[i] += turns.phase[i];
   }
 }
 
@@ -138,19 +138,20 @@ void PolarTracer::add(std::size_t lane, float weight, std::size_t x, Packet& pac
   const Ray& ray = packet.rays[lane];
   if (!ray.is_lit) return;
   float* const light = row.bands.data() + 10 * room_ * x;
-  if (ray.steps.empty()) {
+  if (ray.steps == 0) {
     for (const std::size_t i : {0, 4, 8, 9})
       for (std::size_t k = 0; k < room_; ++k) light[i * room_ + k] += weight;
     return;
   }
   PolarPoint& point = row.points[x];
-  point.integral += std::copysign(2 * ray.phase, light_.strength);
+  const double phase = 2 * packet.phase[lane] / greatest_;
+  point.integral += std::copysign(phase, light_.strength);
   point.length += ray.length;
   ++packet.sums[x].inside;
   if (room_ == 0) return;
   packet.planes.resize(4 * room_);
   std::size_t stride = most_wavelengths;
-  for (double change = 2 * ray.phase * widest_; change > 1 && stride > 1; change /= 3) stride /= 3;
+  for (double change = phase * widest_; change > 1 && stride > 1; change /= 3) stride /= 3;
   const float part = weight * static_cast<float>(stride) / most_wavelengths;
   for (std::size_t i = stride / 2; i < most_wavelengths; i += stride) {
     turn(packet.turns, lane, strengths_[i].data(), room_, part, packet.planes.data(), light);
@@ -170,15 +171,14 @@ LightRow PolarTracer::row(int y) const {
   packet.sums.resize(width);
   // Pixel by pixel, so that rays side by side are close to each other.
   for (std::size_t begin = 0; begin < width * n * n; begin += ray_lanes) {
+    packet.steps.clear();
     for (std::size_t i = 0; i < ray_lanes; ++i) {
       const std::size_t pixel = (begin + i) / (n * n), sample = (begin + i) % (n * n);
-      Ray& ray = packet.rays[i];
-      ray.steps.clear();
-      ray.phase = ray.length = 0;
+      Ray& ray = packet.rays[i] = {};
       const auto place = [&](std::size_t step) { return (static_cast<double>(step) + 0.5) / light_.samples; };
       ray.origin = plate_.to_world({static_cast<double>(pixel) + place(sample % n), y + place(sample / n)});
       ray.index = field_.to_index() * ray.origin;
-      if (pixel < width) find_steps(ray);
+      if (pixel < width) find_steps(i, packet);
     }
     sample(packet);
     for (std::size_t i = 0; i < std::min<std::size_t>(ray_lanes, width * n * n - begin); ++i)

@@ -76,7 +76,7 @@ class PolarTracer {
  private:
   struct Ray;
   struct Packet;
-  void find_steps(Ray& ray) const;
+  void find_steps(std::size_t lane, Packet& packet) const;
   void sample(Packet& packet) const;
   void add(std::size_t lane, float weight, std::size_t x, Packet& packet, LightRow& row) const;
 

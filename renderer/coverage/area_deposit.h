@@ -76,7 +76,7 @@ class AreaDeposit {
   void flush();
 
   /// The sums of the kept rows, which have no meaning of their own. Call flush() before.
-  const std::vector<std::uint64_t>& sums() const { return sums_; }
+  std::vector<std::uint64_t>& sums() { return sums_; }
 
   /// Adds the sums of a deposit of the same rows. @throw std::invalid_argument if it is of other rows.
   void add(const std::vector<std::uint64_t>& sums);

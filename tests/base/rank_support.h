@@ -4,8 +4,11 @@
 
 #include <condition_variable>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <functional>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -49,6 +52,23 @@ class ThreadRanks : public Ranks {
     return rank_ == 0 ? parts : std::vector<std::string>();
   }
 
+  void broadcast(void* bytes, std::size_t size) override {
+    const std::string root = all_gather(rank_ == 0 ? std::string(static_cast<char*>(bytes), size) : "").front();
+    if (root.size() != size) throw std::length_error("ranks broadcast other counts");
+    if (size > 0) std::memcpy(bytes, root.data(), size);
+  }
+
+  void sum(std::vector<std::uint64_t>& numbers) override {
+    Archive mine;
+    mine.copy_list(numbers);
+    numbers.assign(numbers.size(), 0);
+    for (const std::string& given : all_gather(mine.take())) {
+      std::vector<std::uint64_t> more;
+      Archive(given).copy_list(more);
+      for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] += more.at(i);
+    }
+  }
+
  private:
   Table& table_;
   const std::size_t rank_;
@@ -75,6 +95,8 @@ class StrangeRanks : public Ranks {
   std::size_t count() const override { return 2; }
   std::vector<std::string> all_gather(const std::string& mine) override { return {mine, "strange"}; }
   std::vector<std::string> gather(const std::string& mine) override { return {mine, "strange"}; }
+  void broadcast(void*, std::size_t) override {}
+  void sum(std::vector<std::uint64_t>&) override {}
 };
 
 }  // namespace tensorray::test

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -16,7 +17,7 @@
 namespace tensorray {
 namespace {
 
-constexpr std::uint64_t piece_bytes = std::uint64_t{1} << 30;  // Of all ranks: MPI counts them by int.
+constexpr std::size_t piece_size = std::size_t{1} << 30;  // Values that MPI, which counts by int, moves at once.
 constexpr std::chrono::microseconds first_wait(10), longest_wait(1000);
 
 class MpiRanks : public JoinedRanks {
@@ -32,34 +33,60 @@ class MpiRanks : public JoinedRanks {
   std::size_t rank() const override { return static_cast<std::size_t>(rank_); }
   std::size_t count() const override { return static_cast<std::size_t>(count_); }
 
-  std::vector<std::string> all_gather(const std::string& mine) override { return exchange(mine, true); }
-  std::vector<std::string> gather(const std::string& mine) override { return exchange(mine, false); }
+  std::vector<std::string> all_gather(const std::string& mine) override {
+    std::vector<std::string> all = room_for_all(mine);
+    for (int root = 0; root < count_; ++root) {
+      std::string& bytes = all[static_cast<std::size_t>(root)];
+      broadcast_from(root, bytes.data(), bytes.size());
+    }
+    return all;
+  }
+
+  std::vector<std::string> gather(const std::string& mine) override {
+    std::vector<std::string> all = room_for_all(mine);
+    for (int from = 1; from < count_ && (rank_ == 0 || rank_ == from); ++from) {
+      std::string& bytes = all[static_cast<std::size_t>(from)];
+      in_pieces(bytes.data(), bytes.size(), [&](char* piece, int count) {
+        if (rank_ == 0)
+          MPI_Recv(piece, count, MPI_BYTE, from, 0, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+        else
+          MPI_Send(piece, count, MPI_BYTE, 0, 0, MPI_COMM_WORLD);
+      });
+    }
+    return rank_ == 0 ? all : std::vector<std::string>();
+  }
+
+  void broadcast(void* bytes, std::size_t size) override {
+    wait_for_all(size);
+    broadcast_from(0, static_cast<char*>(bytes), size);
+  }
+
+  void sum(std::vector<std::uint64_t>& numbers) override {
+    wait_for_all(numbers.size());
+    in_pieces(numbers.data(), numbers.size(), [](std::uint64_t* piece, int count) {
+      MPI_Allreduce(MPI_IN_PLACE, piece, count, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
+    });
+  }
+
   void finish() override { MPI_Finalize(); }
 
  private:
-  std::vector<std::string> exchange(const std::string& mine, bool to_all) {
-    const std::vector<std::uint64_t> sizes = wait_for_all(mine.size());
-    const bool receives = to_all || rank_ == 0;
-    std::vector<std::string> all(receives ? count() : 0);
-    const std::uint64_t piece = piece_bytes / count(), largest = *std::max_element(sizes.begin(), sizes.end());
-    for (std::uint64_t begin = 0; begin < largest; begin += piece) {
-      std::vector<int> counts, places;
-      int sum = 0;
-      for (const std::uint64_t size : sizes) {
-        counts.push_back(static_cast<int>(std::min(piece, size - std::min(begin, size))));
-        places.push_back(sum);
-        sum += counts.back();
-      }
-      std::string received(receives ? static_cast<std::size_t>(sum) : 0, 0);
-      const char* const from = mine.data() + std::min<std::uint64_t>(begin, mine.size());
-      const int count = counts[rank()];
-      if (to_all)
-        MPI_Allgatherv(from, count, MPI_BYTE, received.data(), counts.data(), places.data(), MPI_BYTE, MPI_COMM_WORLD);
-      else
-        MPI_Gatherv(from, count, MPI_BYTE, received.data(), counts.data(), places.data(), MPI_BYTE, 0, MPI_COMM_WORLD);
-      for (std::size_t each = 0; each < all.size(); ++each)
-        all[each].append(received, static_cast<std::size_t>(places[each]), static_cast<std::size_t>(counts[each]));
-    }
+  /// Calls `use(piece, count)` for one piece after the other.
+  template <class Value, class Use>
+  static void in_pieces(Value* values, std::size_t count, const Use& use) {
+    for (; count > 0; values += std::min(count, piece_size), count -= std::min(count, piece_size))
+      use(values, static_cast<int>(std::min(count, piece_size)));
+  }
+
+  static void broadcast_from(int root, char* bytes, std::size_t size) {
+    in_pieces(bytes, size, [&](char* piece, int count) { MPI_Bcast(piece, count, MPI_BYTE, root, MPI_COMM_WORLD); });
+  }
+
+  /// The bytes of this rank, and room for those of the others.
+  std::vector<std::string> room_for_all(const std::string& mine) const {
+    std::vector<std::string> all;
+    for (const std::uint64_t size : wait_for_all(mine.size())) all.emplace_back(size, 0);
+    all[rank()] = mine;
     return all;
   }
 

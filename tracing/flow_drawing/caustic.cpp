@@ -509,18 +509,16 @@ void add_power(const PowerSums& more, PowerSums& power) {
     for (int end = 0; end < ray_end_count; ++end) power[channel][end] += more[channel][end];
 }
 
-/// Gives the root what this rank has drawn of a strip.
-/// @param deposits  Of the threads. They are joined, and the root adds those of the others.
+/// Adds up what all ranks have drawn of a strip.
+/// @param deposits  Of the threads of this rank; afterwards one, of all.
 /// @param power     Of this rank; at the root, of all.
-void gather_strip(const Drawing& drawing, const Strip& strip, std::vector<AreaDeposit>& deposits, PowerSums& power) {
+void join_strip(const Drawing& drawing, const Strip& strip, std::vector<AreaDeposit>& deposits, PowerSums& power) {
   if (deposits.empty()) deposits.emplace_back(drawing.plate.x(), drawing.plate.y(), strip.first, strip.end);
   for (; deposits.size() > 1; deposits.pop_back()) deposits[0].add(deposits.back().sums());
   gather_in_turn(drawing.ranks, [&](Archive& archive) {
     for (auto& of_channel : power) archive.copy_sums(of_channel.data(), of_channel.size());
-    std::vector<std::uint64_t> sums = archive.reads() ? std::vector<std::uint64_t>() : deposits[0].sums();
-    archive.copy_list(sums);
-    if (archive.reads()) deposits[0].add(sums);
   });
+  drawing.ranks->sum(deposits[0].sums());
 }
 
 void draw_strip(const Drawing& drawing, const Pass& pass, const Strip& strip, PowerSums& power) {
@@ -544,9 +542,9 @@ void draw_strip(const Drawing& drawing, const Pass& pass, const Strip& strip, Po
     deposits.push_back(std::move(worker.deposit));
     add_power(worker.power, drawn);
   }
-  if (drawing.ranks) gather_strip(drawing, strip, deposits, drawn);
+  if (drawing.ranks) join_strip(drawing, strip, deposits, drawn);
   add_power(drawn, power);
-  if (!deposits.empty() && is_root(drawing.ranks)) add_to_films(pass, deposits, strip, width);
+  if (!deposits.empty()) add_to_films(pass, deposits, strip, width);
 }
 
 }  // namespace

@@ -194,7 +194,6 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
   result.plate = part_of(plate, box, settings.resolution);
   const FlowSettings tracing = flow_settings(light, result.plate, settings);
   const std::size_t channels = light.flexibilities.size() - 1;
-  Ranks* const ranks = settings.job ? settings.job->ranks : nullptr;
   bool is_known = !surfaces.body || light.passes == 1;  // Before a body's plane, tilted light is elsewhere.
   for (int pass = 0; pass < light.passes; ++pass) {
     Film irradiance;  // Of this direction.
@@ -204,9 +203,8 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
       const FlowMap map = trace_flow_map(field, geometry, beam, settings.bending, tracing, progress);
       CausticSettings drawing;
       drawing.channels = channels;
-      drawing.ranks = ranks;
+      drawing.ranks = settings.job ? settings.job->ranks : nullptr;
       irradiance = draw_caustic(map, result.plate, bands_of(light, map, tracing), drawing, progress).irradiance;
-      broadcast_list(ranks, irradiance.values);
       if (pass == 0) result.folds = sheets_of(map, result.plate.resolution);
     };
     const std::string name = fmt::format("{}map {} {}", light_name, settings.number, pass);
