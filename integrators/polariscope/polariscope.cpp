@@ -23,19 +23,20 @@ constexpr int most_sections = 10000;           // Of a ray in the body: a limit 
 }  // namespace
 
 struct PolarTracer::Ray {
-  Vector3d origin, index;  // On the plate, in world and in index space.
-  std::size_t steps = 0;
-  double length = 0;  // Of all steps.
+  Vector3d origin, index;    // On the plate, in world and in index space.
+  std::size_t sections = 0;  // In the body.
+  double length = 0;         // Of all.
   bool is_lit = true;
 };
 
 /// Rays side by side.
 struct PolarTracer::Packet {
   std::array<Ray, ray_lanes> rays;
-  struct Step {
-    double middle[ray_lanes] = {}, length[ray_lanes] = {};  // Along the rays, from the plate; 0: there is no step.
+  /// One of each ray: `count` steps of `length`.
+  struct Section {
+    double begin[ray_lanes] = {}, length[ray_lanes] = {}, count[ray_lanes] = {};
   };
-  std::vector<Step> steps;
+  std::vector<Section> sections;
   RaySteps sampled;
   std::vector<RayTurns> turns;
   std::array<double, ray_lanes> phase;  // Σ √(a² + b²) h, of a relative strength of 1.
@@ -93,11 +94,11 @@ void PolarTracer::find_steps(std::size_t lane, Packet& packet) const {
   const auto add_steps = [&](double from, double to) {
     if (!(to > from)) return;
     const double count = std::max(1.0, std::ceil((to - from) * steps_per_length_ - 1e-6)), length = (to - from) / count;
-    for (int i = 0; i < count; ++i, ++ray.steps) {
-      if (ray.steps == packet.steps.size()) packet.steps.emplace_back();
-      packet.steps[ray.steps].middle[lane] = from + (i + 0.5) * length;
-      packet.steps[ray.steps].length[lane] = length;
-    }
+    if (ray.sections == packet.sections.size()) packet.sections.emplace_back();
+    Packet::Section& section = packet.sections[ray.sections++];
+    section.begin[lane] = from;
+    section.length[lane] = length;
+    section.count[lane] = count;
     ray.length += to - from;
   };
   if (!geometry_.has_cut()) return add_steps(begin, end);
@@ -121,15 +122,20 @@ void PolarTracer::sample(Packet& packet) const {
     for (int axis = 0; axis < 3; ++axis) sampled.origin[axis][i] = packet.rays[i].index[axis];
   packet.phase.fill(0);
   packet.turns.clear();
-  for (const Packet::Step& step : packet.steps) {
-    for (std::size_t i = 0; i < ray_lanes; ++i) {
-      sampled.place[0][i] = step.middle[i] - gauss_point * step.length[i];
-      sampled.place[1][i] = step.middle[i] + gauss_point * step.length[i];
-      sampled.length[i] = static_cast<float>(step.length[i]);
+  for (const Packet::Section& section : packet.sections) {
+    const double most = *std::max_element(std::begin(section.count), std::end(section.count));
+    for (double step = 0; step < most; ++step) {
+      for (std::size_t i = 0; i < ray_lanes; ++i) {
+        const double length = step < section.count[i] ? section.length[i] : 0;
+        const double middle = section.begin[i] + (step + 0.5) * section.length[i];
+        sampled.place[0][i] = middle - gauss_point * length;
+        sampled.place[1][i] = middle + gauss_point * length;
+        sampled.length[i] = static_cast<float>(length);
+      }
+      sampler.sample(sampled);
+      packet.turns.push_back(turns_of(sampled));
+      for (std::size_t i = 0; i < ray_lanes; ++i) packet.phase[i] += packet.turns.back().phase[i];
     }
-    sampler.sample(sampled);
-    const RayTurns& turns = packet.turns.emplace_back(turns_of(sampled));
-    for (std::size_t i = 0; i < ray_lanes; ++i) packet.phase[i] += turns.phase[i];
   }
 }
 
@@ -138,7 +144,7 @@ void PolarTracer::add(std::size_t lane, float weight, std::size_t x, Packet& pac
   const Ray& ray = packet.rays[lane];
   if (!ray.is_lit) return;
   float* const light = row.bands.data() + 10 * room_ * x;
-  if (ray.steps == 0) {
+  if (ray.sections == 0) {
     for (const std::size_t i : {0, 4, 8, 9})
       for (std::size_t k = 0; k < room_; ++k) light[i * room_ + k] += weight;
     return;
@@ -171,7 +177,7 @@ LightRow PolarTracer::row(int y) const {
   packet.sums.resize(width);
   // Pixel by pixel, so that rays side by side are close to each other.
   for (std::size_t begin = 0; begin < width * n * n; begin += ray_lanes) {
-    packet.steps.clear();
+    packet.sections.clear();
     for (std::size_t i = 0; i < ray_lanes; ++i) {
       const std::size_t pixel = (begin + i) / (n * n), sample = (begin + i) % (n * n);
       Ray& ray = packet.rays[i] = {};
