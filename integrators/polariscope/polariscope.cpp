@@ -13,14 +13,11 @@
 #include "integrators/polariscope/turning.h"
 
 namespace tensorray {
-namespace {
 
 using Eigen::Vector3d;
 
 constexpr std::size_t most_wavelengths = 243;  // Of a band: a power of three, so that coarser divisions are part of it.
 constexpr int most_sections = 10000;           // Of a ray in the body: a limit that no body reaches.
-
-}  // namespace
 
 struct PolarTracer::Ray {
   Vector3d origin, index;    // On the plate, in world and in index space.
@@ -32,8 +29,7 @@ struct PolarTracer::Ray {
 /// Rays side by side.
 struct PolarTracer::Packet {
   std::array<Ray, ray_lanes> rays;
-  /// One of each ray: `count` steps of `length`.
-  struct Section {
+  struct Section {  // One of each ray: `count` steps of `length`.
     double begin[ray_lanes] = {}, length[ray_lanes] = {}, count[ray_lanes] = {};
   };
   std::vector<Section> sections;
@@ -41,8 +37,7 @@ struct PolarTracer::Packet {
   std::vector<RayTurns> turns;
   std::array<double, ray_lanes> phase;  // Σ √(a² + b²) h, of a relative strength of 1.
   std::vector<float> planes;
-  /// Of each pixel: quaternions w, x, y, z; samples in the field.
-  struct Sum {
+  struct Sum {  // Of each pixel: quaternions w, x, y, z; samples in the field.
     Eigen::Vector4d mean = Eigen::Vector4d::Zero();
     int inside = 0;
   };
