@@ -154,8 +154,9 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
       path_colors(description.color, result.paths,
                   typical_radius(description.radius, result.paths.size(), scene.field.world_box()), units_of(scene));
   const bool has_legend = colors.legend || description.context.slice;
-  // A legend that is asked for as an annotation is beside the picture: it has no effect on other files.
-  if (has_legend && (description.color.legend || output.default_annotations)) {
+  // A legend that is asked for as an annotation is beside the picture: it has no effect on other files. So is that of a
+  // picture whose camera is given.
+  if (has_legend && (description.color.legend || output.default_annotations) && !scene.description.camera.position) {
     const Eigen::Vector2i& size = scene.description.camera.resolution;
     result.legend_room = std::min(legend_width(size.x(), size.y()), static_cast<int>(most_legend * size.x()));
   }
@@ -164,10 +165,6 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   PathShapes shapes = make_shapes(scene, paths_, result.paths, colors, camera);
   result.exposure = 0;
   if (has_picture) result.view = picture_view(camera);
-  if (has_picture && output.default_annotations && !result.view->pixel_size) {
-    result.view->pixel_size = pixel_size(camera, camera.position + camera.focus_distance * camera.forward);
-    result.notes.push_back("the scale bar is that of the middle of the scene, as the camera is in perspective");
-  }
   const auto legends = std::make_shared<std::vector<SurfaceLegend>>();
   if (colors.legend) legends->push_back(colors.legend);
   if (has_legend && (description.color.legend || output.wants(Annotation::legend)))

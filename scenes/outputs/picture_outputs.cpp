@@ -96,14 +96,16 @@ constexpr double unseen = 0.5;  // Grey of wavelengths that the eye does not see
 constexpr double pale = 0.03;   // Part of white in the colour of a wavelength, which makes it reproducible.
 
 /// Draws what the scene asks for, and the picture has. Lines of text and a legend beside the picture make it larger.
-void draw_annotations(const Scene& scene, const Render& render, double exposure, Image& image) {
+/// @param is_lettered  Otherwise only lines of bodies are drawn.
+void draw_annotations(const Scene& scene, const Render& render, double exposure, bool is_lettered, Image& image) {
   const OutputDescription& output = scene.description.output;
   const FieldUnits units = units_of(scene);
   draw_outline(image, render.outline, output.wants(Annotation::body), output.wants(Annotation::hidden));
+  if (!is_lettered) return;
   if (render.view) {
     const Eigen::Vector3d &right = render.view->right, &up = render.view->up;
-    if (output.wants(Annotation::scale) && render.view->pixel_size)
-      draw_scale_bar(image, *render.view->pixel_size, units.length);
+    if (output.wants(Annotation::scale) && !(output.default_annotations && render.view->is_perspective))
+      draw_scale_bar(image, render.view->pixel_size, units.length);
     if (output.wants(Annotation::axes)) draw_axes(image, right, up);
     if (units.is_anatomical && (output.wants(Annotation::axes) || output.default_annotations))
       draw_anatomy(image, right, up, render.draw_legend ? render.legend_room : 0);
@@ -194,10 +196,10 @@ double display_exposure(const Scene& scene, const Render& render) {
   return std::log2(shown_as / *bright);
 }
 
-Image display_image(const Scene& scene, const Render& render, bool holds_alpha) {
+Image display_image(const Scene& scene, const Render& render, bool holds_alpha, bool is_lettered) {
   if (render.display) {
     Image image = *render.display;
-    draw_annotations(scene, render, 0, image);
+    draw_annotations(scene, render, 0, is_lettered, image);
     return image;
   }
   const Image& linear = render.linear;
@@ -219,7 +221,7 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha) 
       lay_hatch(image, at % image.width, at / image.width, divides);
     }
   }
-  draw_annotations(scene, render, exposure, image);
+  draw_annotations(scene, render, exposure, is_lettered, image);
   scene.color.to_display(image);
   return image;
 }
@@ -231,9 +233,8 @@ void write_grids(const std::filesystem::path& file, const Scene& scene, const Re
 PictureView picture_view(const Plate& plate) { return {plate.right, plate.up, plate.pixel_size().x(), plate}; }
 
 PictureView picture_view(const Camera& camera) {
-  PictureView view{camera.right, camera.up, {}};
-  if (camera.projection == Projection::orthographic) view.pixel_size = camera.height / camera.resolution.y();
-  return view;
+  const double pixel = pixel_size(camera, camera.position + camera.focus_distance * camera.forward);
+  return {camera.right, camera.up, pixel, {}, camera.projection == Projection::perspective};
 }
 
 std::function<void(Image&, double)> light_legend(const Scene& scene) {

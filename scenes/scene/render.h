@@ -54,9 +54,10 @@ bool nothing_arrived(const Statistics& statistics);
 
 /// How the pixels of a picture lie in the world.
 struct PictureView {
-  Eigen::Vector3d right, up;         ///< Unit; along x of the picture, and against its y.
-  std::optional<double> pixel_size;  ///< Of all pixels along x, world units; none: of a perspective camera.
-  std::optional<Plate> plate = {};   ///< That has the pixels, in the program's axes; none: of a camera.
+  Eigen::Vector3d right, up;  ///< Unit; along x of the picture, and against its y.
+  double pixel_size;          ///< Of all pixels along x, world units; in perspective, where the camera is focused.
+  std::optional<Plate> plate = {};  ///< That has the pixels, in the program's axes; none: of a camera.
+  bool is_perspective = false;
 };
 
 struct Render {

@@ -62,6 +62,45 @@ TEST(ImportFileTest, NumPyVoxelsAreWhereTheUserSays) {
   EXPECT_EQ(import_tensors(settings, Progress(), report).active_voxels(), 6u);  // The bounds are in world space.
 }
 
+/// Its values are at points or at cells; arrays of more than one number do not count.
+TEST(ImportFileTest, AnImageOfVtkMayBeAMask) {
+  const TemporaryFolder folder;
+  write_xml(*image(), folder / "a.vti");
+  write_xml(*bar(0, 3), folder / "bar.vtu");
+  const auto mask = [&](const char* file, bool of_cells, int arrays, int part) {
+    const auto set = image();
+    if (of_cells)
+      set->SetDimensions(6, 5, 4), set->SetOrigin(0.75, 1.5, 2);  // Its cells are about the points of a.vti.
+    set->GetPointData()->Initialize();
+    if (of_cells) set->GetCellData()->Initialize();
+    for (int array = 0; array < arrays; ++array) {
+      vtkNew<vtkDoubleArray> values;
+      values->SetName(array == 0 ? "brain" : "other");
+      for (int i = 0; i < 60; ++i) values->InsertNextValue(i % 5 < part ? 1 : i % 2 == 0 ? 0 : NAN);
+      (of_cells ? vtkDataSetAttributes::SafeDownCast(set->GetCellData()) : set->GetPointData())->AddArray(values);
+    }
+    write_xml(*set, folder / file);
+  };
+  mask("points.vti", false, 1, 2);
+  mask("cells.vti", true, 1, 3);
+  mask("none.vti", false, 0, 1);
+  mask("several.vti", true, 2, 1);
+  ImportSettings settings;
+  settings.files = {folder / "a.vti"};
+  settings.order = TensorOrder::full;
+  ImportReport report;
+  const auto active = [&](const char* file) {
+    settings.mask = folder / file;
+    return import_tensors(settings, Progress(), report).active_voxels();
+  };
+  EXPECT_EQ(active("points.vti"), 24u);
+  EXPECT_EQ(active("cells.vti"), 36u);
+  for (const auto& [file, text] : {std::pair("none.vti", "rate (3 components"),
+                                   {"several.vti", "other (1 component"},
+                                   {"bar.vtu", "a mask has voxels"}})
+    EXPECT_THAT([&, file = file] { active(file); }, testing::ThrowsMessage<std::invalid_argument>(HasSubstr(text)));
+}
+
 std::string joined(const std::vector<std::string>& lines) {
   std::string text;
   for (const std::string& line : lines) text += line + "\n";

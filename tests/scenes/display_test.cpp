@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "base/constants.h"
 #include "base/files/temporary_folder.h"
 #include "base/geometry/box.h"
 #include "base/process/progress.h"
@@ -34,12 +35,14 @@ const std::vector<MethodCase> methods{
     {"lens", R"({"integrator": {"type": "lens"}})", Part::lower_left, Part::none},
     {"stretch", R"({"integrator": {"type": "stretch", "stretch": {"pixels": 200, "resolution": 8}}})", Part::lower_left,
      Part::beside},
-    {"paths", R"({"integrator": {"type": "path_tracing"}})", Part::none, Part::beside},
-    {"paths of one colour", R"({"integrator": {"type": "path_tracing", "color": {"by": "none"}}})", Part::none,
+    {"paths", R"({"integrator": {"type": "path_tracing"}})", Part::lower_left, Part::beside},
+    {"paths of one colour", R"({"integrator": {"type": "path_tracing", "color": {"by": "none"}}})", Part::lower_left,
      Part::none},
+    {"paths from here", R"({"integrator": {"type": "path_tracing"}, "camera": {"position": [3, -4, 2]}})",
+     Part::lower_left, Part::beside},
     {"parallel paths", R"({"integrator": {"type": "path_tracing"}, "camera": {"projection": "orthographic"}})",
      Part::lower_left, Part::beside},
-    {"whole", R"({"integrator": {"type": "scene"}, "lights": [{"kind": "constant"}]})", Part::none, Part::none},
+    {"whole", R"({"integrator": {"type": "scene"}, "lights": [{"kind": "constant"}]})", Part::lower_left, Part::none},
 };
 
 struct Rendered {
@@ -108,18 +111,22 @@ TEST(Annotations, AreInTheirCornersAndNowhereElse) {
   }
 }
 
-/// Tubes have a legend and a scale bar if nothing is said, where they have a meaning, and no warning. A camera leaves
-/// room for this legend. Maps of stretch have a legend.
+/// Tubes have a legend and a scale bar if nothing is said, where they have a meaning (in perspective, there is no one
+/// scale), and no warning. A camera that is chosen leaves room for this legend. Maps of stretch have a legend.
 TEST(Annotations, OfTubesAndStretchAreThereByDefault) {
   for (const MethodCase& method : methods) {
     const Rendered plain = rendered(method, Json::array()), usual = rendered(method, nullptr);
-    const Json type = Json::parse(method.text)["integrator"]["type"];
-    EXPECT_EQ(usual.display.pixels != plain.display.pixels, type == "path_tracing" || type == "stretch") << method.name;
-    EXPECT_EQ(usual.display.width > plain.display.width, type == "stretch") << method.name;
+    const Json json = Json::parse(method.text), type = json["integrator"]["type"];
+    const bool is_given = json.value("camera", Json::object()).contains("position");
+    const bool has_legend = (type == "path_tracing" || type == "stretch") && method.legend == Part::beside;
+    EXPECT_EQ(usual.display.pixels != plain.display.pixels, has_legend) << method.name;
+    EXPECT_EQ(usual.display.width > plain.display.width, type == "stretch" || is_given) << method.name;
     EXPECT_EQ(usual.render.linear.pixels != plain.render.linear.pixels,
-              type == "path_tracing" && method.legend == Part::beside)
+              type == "path_tracing" && has_legend && !is_given)
         << method.name;
     EXPECT_EQ(usual.render.warnings.size(), plain.render.warnings.size()) << method.name;
+    EXPECT_EQ(usual.render.notes.size(), plain.render.notes.size()) << method.name;
+    EXPECT_EQ(display_image(usual.scene, usual.render, true, false).width, size) << method.name;
   }
 }
 
@@ -172,18 +179,21 @@ TEST(Annotations, KnowTheUnitsOfAScene) {
   EXPECT_EQ(units({{"unit", "MPa"}}, {{"unit", "in"}}).length, "in");
 }
 
-/// Pixels of a plate have its size / resolution, those of an orthographic camera its height / resolution.
+/// Pixels of a plate have its size / resolution, those of a camera its height / resolution.
 TEST(Annotations, KnowTheSizeOfPixels) {
   Plate plate;
   plate.size = {3, 2};
   plate.resolution = {600, 100};
-  EXPECT_DOUBLE_EQ(picture_view(plate).pixel_size.value(), 0.005);
+  EXPECT_DOUBLE_EQ(picture_view(plate).pixel_size, 0.005);
   const Eigen::Vector3d position(0, -5, 0), target(0, 0, 0), up(0, 0, 1);
   const Camera parallel = orthographic_camera(position, target, up, 4, {100, 200});
-  EXPECT_DOUBLE_EQ(picture_view(parallel).pixel_size.value(), 0.02);
+  EXPECT_DOUBLE_EQ(picture_view(parallel).pixel_size, 0.02);
+  EXPECT_FALSE(picture_view(parallel).is_perspective);
   EXPECT_TRUE(picture_view(parallel).right.isApprox(Eigen::Vector3d::UnitX()));
   EXPECT_TRUE(picture_view(parallel).up.isApprox(Eigen::Vector3d::UnitZ()));
-  EXPECT_FALSE(picture_view(perspective_camera(position, target, up, 30, {100, 200})).pixel_size);
+  const PictureView perspective = picture_view(perspective_camera(position, target, up, 30, {100, 200}));
+  EXPECT_TRUE(perspective.is_perspective);
+  EXPECT_DOUBLE_EQ(perspective.pixel_size, 5 * 2 * std::tan(15 * pi / 180) / 200);  // At the target.
 }
 
 /// @return the caption of a scene with these overrides, at a frame if one is given.

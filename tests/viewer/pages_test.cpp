@@ -12,6 +12,8 @@
 #include "tests/names.h"
 #include "tests/viewer/view_support.h"
 #include "tools/viewer/stages.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/making/generators.h"
 
 namespace tensorray {
 namespace {
@@ -173,6 +175,31 @@ TEST_F(PagesTest, AllPagesBeginWithTheSameField) {
   pages_.open(other_mailbox_.sender());
   const Json hello = other_mailbox_.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
   EXPECT_EQ(hello.at("field").at("voxels")[0], 12);
+}
+
+/// The field that an import made has a name that the user has never seen.
+TEST_F(PagesTest, AnImportHasTheNameOfItsFile) {
+  write_tensor_vdb(in_folder("made.vdb"), generate(Helix{}, default_grid(Helix{}, 9)));
+  std::ofstream(in_folder("part.vtu")) << "a mesh";
+  ViewedScene viewed{in_folder("part.vtu"), {"receiver.resolution=[16,16]", "light.photons=1000"}, ""};
+  viewed.imported = in_folder("made.vdb");
+  test::Mailbox mailbox;
+  Pages pages(viewed, progress_);
+  const Pages::Id page = pages.open(mailbox.sender());
+  const Json hello = mailbox.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
+  EXPECT_EQ(hello.at("file"), in_folder("part.vtu").string());
+  EXPECT_EQ(hello.at("scene").at("field").at("file"), in_folder("part.vtu").string());
+  EXPECT_EQ(hello.at("field").at("voxels")[0], 9);
+  Json wrong = hello.at("scene");
+  wrong["light"]["photons"] = -1;
+  pages.receive(page, Json{{"type", "scene"}, {"id", 1}, {"scene", wrong}}.dump());
+  EXPECT_THAT(mailbox.wait("error", 1).json.at("message").get<std::string>(), testing::HasSubstr("part.vtu"));
+  pages.receive(page, Json{{"type", "scene"}, {"id", 2}, {"scene", hello.at("scene")}}.dump());
+  mailbox.final_picture(2);
+  pages.receive(page, Json{{"type", "export"}, {"id", 3}, {"file", "png"}}.dump());
+  EXPECT_EQ(mailbox.wait("file", 3).json.at("name"), "part.png");
+  for (const test::Received& message : mailbox.all())
+    EXPECT_EQ(message.json.dump().find("made.vdb"), std::string::npos) << message.json;
 }
 
 TEST_F(PagesTest, RequestsWaitForTheSceneBeforeThem) {

@@ -63,6 +63,7 @@ GivenField::GivenField(std::vector<std::filesystem::path> files, ImportChoices c
     if (const auto steps = choices_.find("--steps"); steps != choices_.end() && steps->second.front() == "all")
       throw std::invalid_argument("--steps all: makes several fields, by `tensorray import`; give one step");
     imported_ = folder_.emplace() / "field.vdb";
+    tell_as(imported_.string(), name().string());
   } else if (files_.size() > 1) {
     throw std::invalid_argument(escaped(name().string()) +
                                 ": several files are those of one import; this is a scene, or a field, and is given "

@@ -1,11 +1,14 @@
 #include "tools/command_line/run_and_report.h"
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <new>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <unistd.h>
@@ -71,6 +74,32 @@ std::string advice_on_option(const std::string& message, const CLI::App& program
   return here.empty() ? help_advice : "; it is a key of the scene, for --set: " + here;
 }
 
+/// The command line, with "--" behind the numbers of each option that takes one or several: the parser would take the
+/// name of a file for the next one.
+std::vector<const char*> with_ends_of_numbers(const CLI::App& program, int argc, const char* const* argv) {
+  constexpr int several = 9;  // More are a list without an end.
+  std::vector<const char*> words(argv, argv + std::min(argc, 1));
+  const CLI::App* command = &program;
+  for (int i = 1; i < argc;) {
+    const std::string word = argv[i];
+    words.push_back(argv[i++]);
+    const auto is_named = [&](const CLI::App* each) { return each->check_name(word); };
+    for (const CLI::App* const named : command->get_subcommands(is_named)) command = named;
+    if (word == "--") words.insert(words.end(), argv + std::exchange(i, argc), argv + argc);
+    if (word.compare(0, 2, "--") != 0) continue;
+    const std::size_t equals = word.find('=');
+    const CLI::Option* const option = command->get_option_no_throw(word.substr(0, equals));
+    const int most = option ? option->get_items_expected_max() : 0;
+    if (most < 2 || most > several || most == option->get_items_expected_min()) continue;
+    int values = equals == word.npos ? 0 : 1;
+    double number = 0;
+    for (; i < argc && values < most && (values == 0 || CLI::detail::lexical_cast(argv[i], number)); ++values)
+      words.push_back(argv[i++]);
+    if (values > 0) words.push_back("--");
+  }
+  return words;
+}
+
 void on_interrupt(int) {
   progress.cancelled = true;
   std::signal(SIGINT, SIG_DFL);
@@ -112,7 +141,8 @@ int run_and_report(const std::function<void()>& work) {
 
 bool parse(CLI::App& program, int argc, char** argv) {
   try {
-    program.parse(argc, argv);
+    const std::vector<const char*> words = with_ends_of_numbers(program, argc, argv);
+    program.parse(static_cast<int>(words.size()), words.data());
     return true;
   } catch (const CLI::Success& request) {  // --help, --version
     program.exit(request);

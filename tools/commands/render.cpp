@@ -204,7 +204,7 @@ void add_render_command(CLI::App& program, Progress& progress) {
                    "Scene file (JSON; `tensorray schema` prints its keys); or a field, as .vdb or any file that "
                    "`tensorray import` reads: the light that it bends, with all defaults")
       ->required();
-  command->add_option("-o,--output", options->changes.outputs, output_help());
+  command->add_option("-o,--output", options->changes.outputs, output_help())->allow_extra_args(false);
   command
       ->add_option(
           "--set", options->changes.overrides,

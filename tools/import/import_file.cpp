@@ -91,14 +91,29 @@ Lattice placed(Lattice lattice, const ImportSettings& settings) {
   return lattice;
 }
 
+/// A mask in one of VTK's formats: an image, of which one array has one number at each voxel.
+Lattice open_image_mask(const std::filesystem::path& file, ImportReport& report) {
+  const auto data = read_vtk_source(file, std::nullopt, &report.notes);
+  vtkSmartPointer<vtkImageData> image(vtkImageData::SafeDownCast(data));
+  std::vector<std::pair<vtkDataArray*, bool>> arrays;
+  for_each_array(*data, [&](vtkDataArray& array, bool of_cells) {
+    if (array.GetNumberOfComponents() == 1) arrays.emplace_back(&array, of_cells);
+  });
+  if (!image || arrays.size() != 1)
+    throw std::invalid_argument("--mask " + file.string() +
+                                ": a mask has voxels, and one array of one number at each; " + list_of_arrays(*data));
+  return lattice_of(std::move(image), arrays.front().first, arrays.front().second);
+}
+
 /// Those in voxels of the mask that are not 0. It may have other voxels than the grid, in the same world.
 void apply_mask(TensorGrid& grid, const ImportSettings& settings, ImportReport& report) {
   const std::filesystem::path& file = settings.mask;
   const OpenLattice open = lattice_reader(file);
-  if (!open || (open == open_npy && lattice_reader(settings.files.front()) != open_npy))
-    throw std::invalid_argument("--mask " + file.string() +
-                                ": must be NIfTI, NRRD, MetaImage or MRtrix (.nii .nrrd .mha .mif); .npy, of .npy");
-  const Lattice mask = open == open_npy ? placed(open(file, true), settings) : open(file, true);
+  const bool is_npy = open == open_npy;
+  if (is_npy && lattice_reader(settings.files.front()) != open_npy)
+    throw std::invalid_argument("--mask " + file.string() + ": .npy does not say where it is, and is for .npy alone");
+  Lattice mask = open ? open(file, true) : open_image_mask(file, report);
+  if (is_npy) mask = placed(std::move(mask), settings);
   for (const std::string& note : mask.notes) report.notes.push_back("--mask: " + note);
   const std::size_t slice = std::size_t(mask.size.x()) * std::size_t(mask.size.y());
   std::vector<double> values(slice);

@@ -99,10 +99,10 @@ double number(const Json& message, const char* key) {
 
 Pages::Pages(const ViewedScene& viewed, const Progress& progress)
     : viewed_(viewed),
-      scene_(scene_json(viewed.file, viewed.overrides)),
-      allowed_(resolved_files(read_scene_json(scene_, viewed.file))),
-      live_(viewed.file) {
-  const SceneDescription description = read_scene_json(scene_, viewed.file);
+      scene_(scene_json(viewed.file, viewed.overrides, !viewed.imported.empty())),
+      allowed_(resolved_files(read(scene_))),
+      live_(viewed.file, viewed.imported) {
+  const SceneDescription description = read(scene_);
   require_distinct_files(input_files(description), {{viewed.copy, "the file that a page saves to"}});
   live_.load(scene_, outputs_of(description, {}, folder_ / ""), progress);
   field_ = describe_field(live_.scene());
@@ -205,8 +205,12 @@ void Pages::serve(const PagePointer& page) {
   answer_requests(page, false);
 }
 
+SceneDescription Pages::read(const Json& scene) const {
+  return read_scene_json(scene, viewed_.file, {{}, {}, {}, viewed_.imported});
+}
+
 void Pages::check(const Json& scene) const {
-  const SceneDescription description = read_scene_json(scene, viewed_.file);
+  const SceneDescription description = read(scene);
   require_files(description, allowed_);
   require_moderate(description);
 }
@@ -219,7 +223,7 @@ void Pages::begin_scene(Page& page, const Request& request) {
     page.shown = request.message["scene"];
     page.shown_id = id;
     page.landed.reset();
-    const SceneDescription description = read_scene_json(page.shown, viewed_.file);
+    const SceneDescription description = read(page.shown);
     page.stages = stages_of(coarseness_, description.integrator.method().is_sampled());
     const auto is_there = [&](const Stage& stage) {
       return stage.is_final() && live_.has_picture(page.shown, outputs_of(description, stage, folder_ / ""));
@@ -236,7 +240,7 @@ void Pages::begin_scene(Page& page, const Request& request) {
 
 /// Loads the scene that the page shows, for a stage.
 void Pages::load_for(Page& page, const Stage& stage) {
-  const SceneDescription description = read_scene_json(page.shown, viewed_.file);
+  const SceneDescription description = read(page.shown);
   const auto outputs = outputs_of(description, stage, folder_ / "");
   if (description.receiver.resolution) {
     plate_.resolution = *description.receiver.resolution;
@@ -301,7 +305,7 @@ void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading)
   const Scene& scene = live_.scene();
   const Render& render = *page.render;
   auto start = Clock::now();
-  page.display = display_image(scene, render, false);
+  page.display = display_image(scene, render, false, stage.coarseness == 1);
   const Statistics& statistics = render.statistics;
   Json phases{{"load", seconds_loading},
               {"trace", statistics.seconds_tracing},

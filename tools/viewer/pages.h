@@ -37,6 +37,7 @@ struct ViewedScene {
   std::vector<std::string> overrides;
   std::filesystem::path copy;             ///< Pages may save their scene to this file; empty: they may not.
   std::vector<std::string> command = {};  ///< What renders the scene from any folder: the program and its arguments.
+  std::filesystem::path imported = {};    ///< The field that was made of `file` (SceneChanges); empty: it is a scene.
 };
 
 /// Answers the messages of all pages (their protocol: tools/viewer/page/src/state/protocol.ts). One thread renders, for
@@ -104,6 +105,7 @@ class Pages {
   void end_work();
   void send_picture(Page& page, const Stage& stage, double seconds_loading);
   void load_for(Page& page, const Stage& stage);
+  SceneDescription read(const Json& scene) const;
   void check(const Json& scene) const;
 
   const ViewedScene viewed_;

@@ -157,7 +157,7 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
                              const Progress& progress) {
   const Json loaded = with_names(json, outputs);
   if (scene_ && loaded == loaded_) return *scene_;
-  SceneDescription description = read_scene_json(json, file_, {{}, outputs});
+  SceneDescription description = read_scene_json(json, file_, {{}, outputs, {}, imported_});
   const Json of_scale = scale_keys(json), of_direction = direction_keys(json);
   const bool chooses_scale = !description.field.scale, chooses_direction = !description.light.direction;
   if (chooses_scale && of_scale == of_scale_) description.field.scale = scale_;

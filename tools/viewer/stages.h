@@ -64,7 +64,9 @@ std::vector<std::filesystem::path> outputs_of(const SceneDescription& descriptio
 class LiveScene {
  public:
   /// @param file  The scene's file; its folder is that of relative paths.
-  explicit LiveScene(std::filesystem::path file) : file_(std::move(file)) {}
+  /// @param imported  The field that was made of it, if it is another program's.
+  explicit LiveScene(std::filesystem::path file, std::filesystem::path imported = {})
+      : file_(std::move(file)), imported_(std::move(imported)) {}
 
   /// The scene of `json`, loaded. It is valid until the next call. If the call throws, the scene, and its picture, stay
   /// those before: where the field changes, both fields are in memory for a moment.
@@ -81,7 +83,7 @@ class LiveScene {
   const Scene& scene() const { return *scene_; }
 
  private:
-  std::filesystem::path file_;
+  std::filesystem::path file_, imported_;
   std::optional<Scene> scene_;
   Json loaded_, rendered_;        ///< What scene and picture were made of.
   Json of_scale_, of_direction_;  ///< What the automatic choices depend on.

@@ -76,6 +76,27 @@ TEST_F(ImportErrors, WrongArguments) {
   expect_error("missing", {"import", "image.vti", "-q", "-o", "missing/image.vdb"}, 1);
 }
 
+/// Options that take one number or three end where a word is none.
+TEST_F(ImportErrors, NamesOfFilesAreNoNumbers) {
+  write("image.vti", image());
+  write("array.npy", npy());
+  const Arguments table[] = {{"import", "--resolution", "8", "image.vti", "-q", "-o", "a.vdb"},
+                             {"import", "--resolution=8", "image.vti", "-q", "-o", "a.vdb"},
+                             {"import", "--resolution", "8", "9", "8", "image.vti", "-q", "-o", "a.vdb"},
+                             {"import", "-q", "-o", "a.vdb", "--voxel-size", "0.5", "--", "array.npy"},
+                             {"import", "--voxel-size", "0.5", "0.5", "1", "array.npy", "-o", "a.vdb", "-q"},
+                             {"info", "--voxel-size", "0.5", "array.npy", "--json"},
+                             {"derive", "--voxel-size", "0.5", "array.npy", "--invariant", "trace", "-o", "a.vdb"},
+                             {"make", "point_load", "--resolution", "8", "-o", "a.vdb"}};
+  for (const Arguments& arguments : table) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, 0) << fmt::format("{}: {}", fmt::join(arguments, " "), outcome.error);
+  }
+  refuses({"--voxel-size", "0.5", "0.5", "array.npy"}, 2, {"--voxel-size", "one number, or three"});
+  refuses({"--voxel-size", "array.npy"}, 2, {"array.npy is no size"});
+  expect_error("missing.json", {"render", "-o", "a.png", "missing.json", "-q"});  // Not as another picture.
+}
+
 /// Numbers that a file or a user may give, and that OpenVDB refuses, or writes and does not read; and no voxels.
 TEST_F(ImportErrors, VoxelsThatAreNowhere) {
   write("array.npy", npy());

@@ -185,6 +185,8 @@ TEST_F(FieldAlone, FilesThatHaveToBeImportedAreRenderedAsTheyAreAfterAnImport) {
   for (const auto& [text, arguments] : early) expect_error(text, arguments);
   EXPECT_EQ(read_file(in_folder("mask.nii")), "a mask");
   expect_error("case.foam", {"render", "case.foam", "--gradient-of", "U"});
+  expect_error("tensors.nrrd: has no tensor field",
+               {"derive", "tensors.nrrd", "--name", "bogus", "--invariant", "trace", "-o", "a.vdb"});
   expect_error("three edges", {"render", "tensors.nrrd", "--voxel-size", "1", "1", "2"});
 
   expect_error("tensorray import", {"render", "tensors.nrrd", "--save-scene", "scene.json"});

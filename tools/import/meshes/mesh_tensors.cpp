@@ -36,20 +36,6 @@ bool suits(int components, Take take, bool is_named) {
   return components == 3;
 }
 
-/// Calls `visit(array, of_cells)` for the named numeric arrays, first those of points.
-template <class Visit>
-void for_each_array(vtkDataSet& mesh, const Visit& visit) {
-  for (const bool of_cells : {false, true}) {
-    vtkDataSetAttributes& data = attributes_of(mesh, of_cells);
-    for (int i = 0; i < data.GetNumberOfArrays(); ++i) {
-      vtkDataArray* array = data.GetArray(i);
-      if (!array || !array->GetName()) continue;
-      const std::string name = array->GetName();
-      if (name != vtkDataSetAttributes::GhostArrayName() && name != layer_array) visit(*array, of_cells);
-    }
-  }
-}
-
 const char* wanted(Take take) {
   return take == Take::tensor ? "a tensor has 6, 9, or more than 9 components, of a plane 4"
                               : "a vector has 3 components";
@@ -219,6 +205,18 @@ const char* flag_of(Take take) {
 
 vtkDataSetAttributes& attributes_of(vtkDataSet& mesh, bool of_cells) {
   return *mesh.GetAttributes(of_cells ? vtkDataObject::CELL : vtkDataObject::POINT);
+}
+
+void for_each_array(vtkDataSet& mesh, const std::function<void(vtkDataArray&, bool)>& visit) {
+  for (const bool of_cells : {false, true}) {
+    vtkDataSetAttributes& data = attributes_of(mesh, of_cells);
+    for (int i = 0; i < data.GetNumberOfArrays(); ++i) {
+      vtkDataArray* array = data.GetArray(i);
+      if (!array || !array->GetName()) continue;
+      const std::string name = array->GetName();
+      if (name != vtkDataSetAttributes::GhostArrayName() && name != layer_array) visit(*array, of_cells);
+    }
+  }
 }
 
 std::string list_of_arrays(vtkDataSet& mesh) {

@@ -2,6 +2,7 @@
 /// @file tools/import/meshes/mesh_tensors.h
 /// Makes tensors at the points of a mesh from the arrays that solvers write.
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -51,6 +52,9 @@ constexpr const char* tensor_array = "tensor";
 
 /// Cells may have a vtkIntArray of this name: which of several layers, of which each overlaps others, they are in.
 constexpr const char* layer_array = "tensorray:layer";
+
+/// Calls `visit(array, of_cells)` for the named numeric arrays, first those of points; not for those of this program.
+void for_each_array(vtkDataSet& mesh, const std::function<void(vtkDataArray&, bool)>& visit);
 
 /// The arrays of a mesh in words, for messages: "there are: velocity (3 components, points), ...".
 std::string list_of_arrays(vtkDataSet& mesh);

@@ -80,7 +80,9 @@ void view(ViewOptions options, Progress& progress) {
   set_image_threads(static_cast<int>(running_threads()));
   const GivenField given(options.files, options.import);
   if (!options.viewed.copy.empty()) given.require_stays();
-  options.viewed.file = given.path();
+  const std::filesystem::path& name = given.name();
+  options.viewed.file = name.has_filename() ? name : name.parent_path();  // "case/"
+  options.viewed.imported = given.imported();
   if (!given.is_imported() && options.viewed.copy.empty()) options.viewed.copy = default_copy(options.viewed.file);
   require_same_folder(options.viewed.file, options.viewed.copy);
   given.import(options.quiet);
