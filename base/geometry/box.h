@@ -2,7 +2,11 @@
 /// @file base/geometry/box.h
 /// Boxes along the axes, and points.
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -24,6 +28,23 @@ inline std::vector<Eigen::Vector3d> corners_of(const Eigen::AlignedBox3d& box,
   for (int i = 0; i < 8; ++i)
     corners.push_back(transform * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
   return corners;
+}
+
+/// Where the line from + t · along is in a box: from the first t to the second; nothing if it does not meet the box.
+inline std::optional<std::pair<double, double>> passage(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& from,
+                                                        const Eigen::Vector3d& along) {
+  double first = -std::numeric_limits<double>::infinity(), last = -first;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = box.min()[axis] - from[axis], high = box.max()[axis] - from[axis];
+    if (along[axis] == 0) {
+      if (!(low <= 0 && high >= 0)) return std::nullopt;
+      continue;
+    }
+    first = std::max(first, std::min(low / along[axis], high / along[axis]));
+    last = std::min(last, std::max(low / along[axis], high / along[axis]));
+  }
+  if (!(first <= last)) return std::nullopt;
+  return std::pair(first, last);
 }
 
 // The smallest rotation that turns one direction to another.

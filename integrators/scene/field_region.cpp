@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/constants.h"
+#include "base/geometry/box.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
@@ -72,18 +73,9 @@ FieldRegion::FieldRegion(const TensorField& field, const Geometry& geometry, Fie
 double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) const {
   const Eigen::AlignedBox3d& box = field_.index_bounds();
   const Vector3d from = field_.to_index() * origin, along = field_.to_index().linear() * direction;
-  constexpr double infinite = std::numeric_limits<double>::infinity();
-  double enters = 0, leaves = infinite;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (along[axis] == 0) {
-      if (from[axis] < box.min()[axis] || from[axis] > box.max()[axis]) return infinite;
-      continue;
-    }
-    const double a = (box.min()[axis] - from[axis]) / along[axis], b = (box.max()[axis] - from[axis]) / along[axis];
-    enters = std::max(enters, std::min(a, b));
-    leaves = std::min(leaves, std::max(a, b));
-  }
-  return leaves - enters > rounding_ ? enters : infinite;
+  const auto [first, last] = passage(box, from, along).value_or(std::pair(0.0, 0.0));
+  const double enters = std::max(0.0, first);
+  return last - enters > rounding_ ? enters : std::numeric_limits<double>::infinity();
 }
 
 /// Where a way is followed from. With obstacles, a little behind the entry, so as not to meet the surface it starts on.

@@ -65,9 +65,9 @@ ChannelTable<StretchPixel> stretch_channels() {
 
 /// Makes the pictures from the values at the pixels of the entry plane, which is seen along the light as the plate is.
 void draw(const Scene& scene, const std::vector<float>& values, const Eigen::Vector2i& resolution, Render& render) {
-  ValueRange range = choose_range({values.begin(), values.end()});
-  range.high = std::max(std::abs(range.low), std::abs(range.high));  // 0 has the middle of the colours.
-  range.low = -range.high;
+  RangeChoice choice;
+  choice.symmetric = true;  // 0 has the middle of the colours.
+  const ValueRange range = choose_range({values.begin(), values.end()}, choice);
   const Eigen::Matrix3d to_working = scene.color.xyz_to_working() * rec709_to_xyz();
   const ChannelTable<StretchPixel> table = stretch_channels();
   Image linear(resolution.x(), resolution.y(), channel_names(table));
@@ -144,10 +144,7 @@ class StretchMethod : public MethodWith<StretchKeys> {
   }
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
-    if (chosen && !given(json, "/output/annotations")) {
-      scene.output.annotations = {Annotation::legend};
-      scene.output.default_annotations = true;
-    }
+    if (chosen) default_annotations(scene, json, {Annotation::legend});
     if (chosen && scene.bending.rgb && settings().stretch.wavelength)
       source.fail(
           "`/integrator/stretch/wavelength`: light has no wavelength where `/bending/rgb` is given; remove one "

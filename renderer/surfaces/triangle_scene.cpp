@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "base/geometry/box.h"
 #include "renderer/surfaces/embree_handles.h"
 
 namespace tensorray {
@@ -42,23 +43,6 @@ void take_outwards(const RTCFilterFunctionNArguments* all) {
     const Eigen::Vector3f normal(hit.Ng_x, hit.Ng_y, hit.Ng_z), along(ray.dir_x, ray.dir_y, ray.dir_z);
     if (normal.dot(along) < -0.1f * normal.norm()) all->valid[i] = 0;
   }
-}
-
-/// Distance at which a line enters the box; nothing if it does not meet the box.
-std::optional<double> entry(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& from,
-                            const Eigen::Vector3d& direction) {
-  double first = -std::numeric_limits<double>::infinity(), last = std::numeric_limits<double>::infinity();
-  for (int axis = 0; axis < 3; ++axis) {
-    const double low = box.min()[axis] - from[axis], high = box.max()[axis] - from[axis];
-    if (direction[axis] == 0) {
-      if (!(low <= 0 && high >= 0)) return std::nullopt;
-      continue;
-    }
-    first = std::max(first, std::min(low / direction[axis], high / direction[axis]));
-    last = std::min(last, std::max(low / direction[axis], high / direction[axis]));
-  }
-  if (!(first <= last)) return std::nullopt;
-  return first;
 }
 
 }  // namespace
@@ -123,9 +107,9 @@ struct TriangleScene::State {
   bool begin(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double max_distance,
              double& min_distance) const {
     if (!is_far(from + min_distance * direction)) return true;
-    const auto way = entry(box, from, direction);
-    if (way) min_distance = std::max(min_distance, *way);
-    return way && *way <= max_distance;
+    const auto way = passage(box, from, direction);
+    if (way) min_distance = std::max(min_distance, way->first);
+    return way && way->first <= max_distance;
   }
 
   RTCRayHit ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
@@ -217,9 +201,9 @@ void TriangleScene::along(const Eigen::Vector3d& from, const Eigen::Vector3d& di
   if (!state_->scene) return;
   double start = -1e-5 * state_->unit;  // Triangles at the start must not be lost.
   if (state_->is_far(from)) {
-    const auto way = entry(state_->box, from, direction);
+    const auto way = passage(state_->box, from, direction);
     if (!way) return;
-    start = std::max(start, *way);
+    start = std::max(start, way->first);
   }
   const auto add = [](void* user, const embree::MetTriangle& met) {
     static_cast<std::vector<TriangleId>*>(user)->push_back({met.geometry, met.primitive});

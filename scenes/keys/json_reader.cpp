@@ -37,33 +37,19 @@ std::string read_text(const SceneSource& source) {
   return text;
 }
 
-/// A callback of the parser that refuses repeated keys and deep nesting, which JSON allows.
-class StrictRules {
- public:
-  bool operator()(int depth, Json::parse_event_t event, Json& parsed) {
-    using Event = Json::parse_event_t;
-    if (event == Event::object_start || event == Event::array_start)
-      if (depth >= nesting_limit) throw SceneError(fmt::format("is nested deeper than {} levels", nesting_limit));
-    if (event == Event::object_start) {
-      keys_.emplace_back();
-    } else if (event == Event::object_end) {
-      keys_.pop_back();
-    } else if (event == Event::key) {
-      const auto& key = parsed.get_ref<const std::string&>();
-      if (!keys_.back().insert(key).second)
-        throw SceneError(fmt::format("key `{}` is given twice in the same object; remove one", key));
-    }
-    return true;
-  }
-
- private:
-  std::vector<std::set<std::string>> keys_;  // The keys of each object that has begun and not ended.
-};
-
+/// Refuses repeated keys and deep nesting, which JSON allows.
 Json parse(const std::string& text, bool comments) {
-  StrictRules rules;
-  const auto follow = [&rules](int depth, Json::parse_event_t event, Json& parsed) {
-    return rules(depth, event, parsed);
+  using Event = Json::parse_event_t;
+  std::vector<std::set<std::string>> keys;  // Of each object that has begun and not ended.
+  const auto follow = [&keys](int depth, Event event, Json& parsed) {
+    if ((event == Event::object_start || event == Event::array_start) && depth >= nesting_limit)
+      throw SceneError(fmt::format("is nested deeper than {} levels", nesting_limit));
+    if (event == Event::object_start) keys.emplace_back();
+    if (event == Event::object_end) keys.pop_back();
+    if (event == Event::key && !keys.back().insert(parsed.get<std::string>()).second)
+      throw SceneError(
+          fmt::format("key `{}` is given twice in the same object; remove one", parsed.get<std::string>()));
+    return true;
   };
   return Json::parse(text, follow, true, comments);
 }

@@ -32,12 +32,6 @@ Json number_schema(const char* type, const Limits& limits) {
   return schema;
 }
 
-std::string quoted(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += fmt::format("{}\"{}\"", text.empty() ? "" : ", ", word);
-  return text;
-}
-
 }  // namespace
 
 Limits limits_of_each(Limits limits) {
@@ -140,7 +134,9 @@ bool Value<Word>::read(const Json& json, const Limits&, Word& target) {
   return std::find(target.allowed.begin(), target.allowed.end(), target.value) != target.allowed.end();
 }
 
-std::string Value<Word>::expectation(const Word& target, const Limits&) { return "one of " + quoted(target.allowed); }
+std::string Value<Word>::expectation(const Word& target, const Limits&) {
+  return fmt::format("one of \"{}\"", fmt::join(target.allowed, "\", \""));
+}
 Json Value<Word>::schema(const Word& target, const Limits&) { return {{"enum", target.allowed}}; }
 Json Value<Word>::json(const Word& value) { return Value<std::string>::json(value.value); }
 

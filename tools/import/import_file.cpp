@@ -23,12 +23,10 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
-#include "tools/import/cases/exodus.h"
-#include "tools/import/cases/plot3d.h"
+#include "tools/import/cases/case_files.h"
 #include "tools/import/lattice_files/lattice_files.h"
 #include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/flat_mesh.h"
-#include "tools/import/meshes/mesh_tensors.h"
 #include "tools/import/sampling/sampling_lattice.h"
 #include "tools/import/surfaces/mesh_boundary.h"
 #include "tools/import/surfaces/triangle_shells.h"

@@ -2,7 +2,6 @@
 /// @file volumes/files/voxel_images.h
 /// Numbers at the voxels of a box, as files that programs of medical images and ParaView show.
 
-#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -9,6 +9,8 @@
 
 #include <Eigen/Geometry>
 
+#include "base/geometry/box.h"
+
 namespace tensorray {
 
 /// Calls `visit(voxel, from, to)` for each voxel that the segment from `a` to `b` crosses within `bounds`, in order.
@@ -20,16 +22,9 @@ void walk_voxels(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen
                  const Visit& visit) {
   constexpr double never = std::numeric_limits<double>::infinity();
   const Eigen::Vector3d along = b - a;
-  double from = 0, end = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double to_min = bounds.min()[axis] - a[axis], to_max = bounds.max()[axis] - a[axis];
-    if (along[axis] == 0) {
-      if (to_min > 0 || to_max < 0) return;
-      continue;
-    }
-    from = std::max(from, std::min(to_min / along[axis], to_max / along[axis]));
-    end = std::min(end, std::max(to_min / along[axis], to_max / along[axis]));
-  }
+  const auto [first, last] = passage(bounds, a, along).value_or(std::pair(1.0, 0.0));
+  double from = std::max(0.0, first);
+  const double end = std::min(1.0, last);
   if (!(from < end)) return;
 
   const Eigen::Array3d least = (bounds.min().array() + 0.5).floor(), greatest = (bounds.max().array() - 0.5).ceil();

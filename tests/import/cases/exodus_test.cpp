@@ -1,6 +1,6 @@
 // ExodusII files whose writer was stopped, or which announce what they do not hold; and pieces of Nemesis.
 
-#include "tools/import/cases/exodus.h"
+#include "tools/import/cases/case_files.h"
 
 #include <array>
 #include <functional>

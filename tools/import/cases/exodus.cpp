@@ -1,4 +1,4 @@
-#include "tools/import/cases/exodus.h"
+#include "tools/import/cases/case_files.h"
 
 #include <algorithm>
 #include <array>

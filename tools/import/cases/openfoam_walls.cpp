@@ -1,9 +1,8 @@
-#include "tools/import/cases/openfoam_walls.h"
+#include "tools/import/cases/openfoam.h"
 
 #include <algorithm>
 #include <optional>
 #include <regex>
-#include <utility>
 
 #include <vtkCell.h>
 #include <vtkCellData.h>

@@ -1,4 +1,4 @@
-#include "tools/import/cases/plot3d.h"
+#include "tools/import/cases/case_files.h"
 
 #include <limits>
 #include <string>

@@ -4,7 +4,6 @@
 ///   tensorray-import --read-vtp EXCHANGE FILE NAME...    VTK polydata, with the named arrays → a file of vtk_files.h
 /// Only volumes/points/vtk_files.h uses the last one. Its errors are one line, without the program's name.
 
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
