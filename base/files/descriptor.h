@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/files/descriptor.h
 /// File descriptors of the system. Where this project needs one, and not a stream, it is a Descriptor.
 
 #include <cstddef>

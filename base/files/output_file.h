@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/files/output_file.h
 /// Output files that are either complete or absent, and never those that a run reads.
 
 #include <cstddef>

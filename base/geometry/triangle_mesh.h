@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/geometry/triangle_mesh.h
 /// Triangles: the one type that fields, importers and the renderer share.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/lens/lens.h
 /// A known image seen through a tensor field (Zheng and Pang 2003, section on lens simulation).
 ///
 /// Light travels from the image to the receiver. The viewer stands behind the receiver and looks against the light.

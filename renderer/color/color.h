@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/color/color.h
 /// Conversion from CIE XYZ to the scene-linear working space, and from there to a display, by OpenColorIO.
 
 #include <array>

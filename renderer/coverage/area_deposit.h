@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/coverage/area_deposit.h
 /// Exact deposit of light on pixels: each pixel gets the area that it shares with each triangle.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/film/film.h
 /// Light that a plate collects, by pixels or as photons.
 
 #include <cstddef>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/images/image.h
 /// A picture in memory, and the functions that read and write files (OpenImageIO; EXR and PNG without).
 
 #include <array>

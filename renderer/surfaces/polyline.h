@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/surfaces/polyline.h
 /// Leaves out the points of a polyline that can be interpolated from their neighbours.
 
 #include <cstddef>

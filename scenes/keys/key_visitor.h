@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/keys/key_visitor.h
 /// Tables of keys. `describe(keys, visit)` of a struct shows each of its keys to a visitor: the reader
 /// (SectionReader) or the schema writer (SchemaWriter), which so agree.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/outputs/channel_table.h
 /// The channels of an EXR as a table: each row has names and values together. docs/scenes.md says what they mean.
 
 #include <cstddef>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/scene/scene.h
 /// Everything that a render needs. Immutable after loading.
 
 #include <cstddef>

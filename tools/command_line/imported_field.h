@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/command_line/imported_field.h
 /// Takes other programs' files without a separate import.
 
 #include <cstddef>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/bending/bending.h
 /// Rays: settings of how they are followed, their records and their ends. In a tensor field light bends by (Zheng and
 /// Pang 2003, Eq. 5)
 ///   P' = V,  V' = σ (T V − (VᵀTV) V),  |V| = 1, with σ = s · scale.

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/flow/ray_memory.h
 /// Keeps the rays of a flow map, for other maps of the same light to other plates.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/flow/wavelength_tracer.h
 /// Landings of light of one vertex at all its wavelength samples: some are traced, the others predicted.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/flow_drawing/caustic.h
 /// The light of a flow map on the pixels of its plate: each triangle's light is spread evenly over the triangle between
 /// its landings, and each pixel gets the exact area that it shares with it.
 

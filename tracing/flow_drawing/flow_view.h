@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/flow_drawing/flow_view.h
 /// Reads a flow map at the points of a picture: which light starts, or lands, there.
 
 #include <cstddef>

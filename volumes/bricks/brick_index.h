@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/bricks/brick_index.h
 /// Finds the brick that is at a given place.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/bricks/brick_memory.h
 /// Memory for the bricks of a field, and for the blocks that they are made of.
 
 #include <cstddef>

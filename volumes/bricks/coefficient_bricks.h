@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/bricks/coefficient_bricks.h
 /// The bricks of a field while it is made: which voxels have coefficients, and where these are in memory. The
 /// coefficients of a linear field are its values.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/bricks/tensor_field.h
 /// A tensor field that light can be traced through: immutable bricks in memory, and what is between their voxels.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/grids/tensor_grid.h
 /// Tensors, or numbers, at the voxels of a sparse grid. Files hold them, generators make them, and preprocessing
 /// changes them. Tracing needs a TensorField, which is built from it.
 

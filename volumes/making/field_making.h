@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/making/field_making.h
 /// Makes a field of blocks in one pass: each block is read, cleaned, preprocessed and placed in its bricks while it is
 /// in the processor's caches, without a grid in between.
 

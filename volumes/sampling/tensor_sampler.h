@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/sampling/tensor_sampler.h
 /// The tensor at a point, in double precision; and at many points, in single precision, side by side.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/tensors/statistics.h
 /// The numbers that `tensorray info` prints about a field.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/cases/case_files.h
 /// Readers of files that VTK's readers take as they come: these check first whether the files are whole. All of them:
 /// @throw std::runtime_error, one line that names the file and the fix.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/cases/openfoam.h
 /// The folders of an OpenFOAM case, regions and the parts that processors wrote, the order of its tensors, and what the
 /// boundaryField of its fields prescribes for vectors at patches.
 

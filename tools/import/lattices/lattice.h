@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/lattices/lattice.h
 /// Numbers at the voxels of a lattice, as read from a file of voxels, before they become a tensor grid.
 
 #include <cstddef>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/meshes/mesh_cell.h
 /// A cell of a mesh, and its interpolation at a point in space.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/sampling/block_places.h
 /// The blocks of a lattice that are sampled.
 
 #include <bitset>

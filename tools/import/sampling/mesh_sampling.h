@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/sampling/mesh_sampling.h
 /// Samples tensors on a mesh at the voxels of a lattice.
 
 #include <cstddef>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/surfaces/body_surface.h
 /// The surface of the body that a mesh is.
 
 #include <cstddef>

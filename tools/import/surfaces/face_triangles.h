@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/surfaces/face_triangles.h
 /// Triangles of the faces of cells, flat and curved.
 
 #include <cstddef>

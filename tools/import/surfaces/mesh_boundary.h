@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/surfaces/mesh_boundary.h
 /// The surface of the body inside a mesh.
 
 #include <cstddef>

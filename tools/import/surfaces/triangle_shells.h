@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/surfaces/triangle_shells.h
 /// Measures and cuts closed surfaces that are oriented outwards, of several shells that may touch or overlap.
 
 #include <cstddef>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/viewer/server/server_state.h
 /// What all connections of a Server share. Private to the sources of the server: it includes Boost.
 
 #include <cstddef>
