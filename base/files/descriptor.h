@@ -1,7 +1,6 @@
 #pragma once
 /// File descriptors of the system. Where this project needs one, and not a stream, it is a Descriptor.
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string_view>

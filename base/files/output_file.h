@@ -1,7 +1,6 @@
 #pragma once
 /// Output files that are either complete or absent, and never those that a run reads.
 
-#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <string>

@@ -2,7 +2,6 @@
 /// Triangles: the one type that fields, importers and the renderer share.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>

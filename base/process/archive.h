@@ -2,7 +2,6 @@
 /// Values as bytes, and back: what is kept in files of results, and what ranks give each other. One function copies a
 /// value both ways. Numbers have the byte order of the machine: all machines of a render must have the same.
 
-#include <cstddef>
 #include <cstring>
 #include <stdexcept>
 #include <string>

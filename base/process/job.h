@@ -7,7 +7,6 @@
 /// - ranks (ranks.h) make every Nth unit, and give it to the others.
 
 #include <atomic>
-#include <cstddef>
 #include <functional>
 #include <map>
 #include <memory>

@@ -2,7 +2,6 @@
 /// Processes that make one result together: each runs the same code, does every `count`-th unit of each step, and gives
 /// it to the others. As in MPI, rank 0 is the root.
 
-#include <cstddef>
 #include <functional>
 #include <string>
 #include <vector>

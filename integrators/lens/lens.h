@@ -8,7 +8,6 @@
 /// Both modes are a flow map (tracing/flow/flow_map.h) of a LensMap, which all bands share: `scatter` draws its
 /// mesh over the landings, `gather` traces from the receiver and draws its mesh over the starts.
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>

@@ -1,7 +1,6 @@
 #pragma once
 /// What the points of a lens's picture see of the image, in all of its light, and the light of its pixels.
 
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Geometry>

@@ -1,7 +1,6 @@
 #pragma once
 /// Traces photons in chunks of positions. What a chunk gives is a function of its number alone.
 
-#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>

@@ -1,7 +1,6 @@
 #pragma once
 /// Legends drawn into pictures: a labelled colour bar for numbers, and a key that lists colours and their meanings.
 
-#include <cstddef>
 #include <functional>
 #include <string>
 #include <vector>

@@ -2,7 +2,6 @@
 /// Conversion from CIE XYZ to the scene-linear working space, and from there to a display, by OpenColorIO.
 
 #include <array>
-#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <memory>

@@ -2,7 +2,6 @@
 /// Exact deposit of light on pixels: each pixel gets the area that it shares with each triangle.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

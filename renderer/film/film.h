@@ -1,7 +1,6 @@
 #pragma once
 /// Light that a plate collects, by pixels or as photons.
 
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>

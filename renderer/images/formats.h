@@ -2,7 +2,6 @@
 /// How picture files are encoded and decoded, for image.h. Errors are std::runtime_error without the file's name.
 
 #include <algorithm>
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>

@@ -2,7 +2,6 @@
 /// A picture in memory, and the functions that read and write files (OpenImageIO; EXR and PNG without).
 
 #include <array>
-#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <memory>

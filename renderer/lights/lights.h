@@ -3,7 +3,6 @@
 /// light that the bands are made from: see Band.
 
 #include <algorithm>
-#include <cstddef>
 #include <limits>
 #include <memory>
 #include <optional>

@@ -1,7 +1,6 @@
 #pragma once
 /// Leaves out the points of a polyline that can be interpolated from their neighbours.
 
-#include <cstddef>
 #include <vector>
 
 namespace tensorray {

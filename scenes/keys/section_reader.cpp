@@ -1,7 +1,6 @@
 #include "scenes/keys/section_reader.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <stdexcept>
 #include <utility>
 #include <variant>

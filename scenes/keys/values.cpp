@@ -1,7 +1,6 @@
 #include "scenes/keys/values.h"
 
 #include <cmath>
-#include <cstddef>
 
 #include "base/text/path_text.h"
 #include "base/text/text.h"

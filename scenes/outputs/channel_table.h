@@ -1,7 +1,6 @@
 #pragma once
 /// The channels of an EXR as a table: each row has names and values together. docs/scenes.md says what they mean.
 
-#include <cstddef>
 #include <functional>
 #include <string>
 #include <type_traits>

@@ -1,7 +1,6 @@
 #pragma once
 /// What a method has computed of a field, kept for the next scenes of the same field.
 
-#include <cstddef>
 #include <deque>
 #include <memory>
 #include <mutex>

@@ -1,7 +1,6 @@
 #pragma once
 /// Everything that a render needs. Immutable after loading.
 
-#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>

@@ -1,7 +1,6 @@
 #pragma once
 /// Takes other programs' files without a separate import.
 
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <vector>

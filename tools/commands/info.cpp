@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
-#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <memory>

@@ -5,7 +5,6 @@
 /// Only bending_steps.h and, for packets, packet_step-inl.h contain this rule.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>

@@ -3,7 +3,6 @@
 /// its landings, and each pixel gets the exact area that it shares with it.
 
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>

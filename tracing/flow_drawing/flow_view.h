@@ -1,7 +1,6 @@
 #pragma once
 /// Reads a flow map at the points of a picture: which light starts, or lands, there.
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

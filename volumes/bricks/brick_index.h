@@ -2,7 +2,6 @@
 /// Finds the brick that is at a given place.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #pragma once
 /// Memory for the bricks of a field, and for the blocks that they are made of.
 
-#include <cstddef>
 #include <memory>
 
 #include "base/files/descriptor.h"

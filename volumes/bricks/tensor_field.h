@@ -2,7 +2,6 @@
 /// A tensor field that light can be traced through: immutable bricks in memory, and what is between their voxels.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>

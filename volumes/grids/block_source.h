@@ -1,7 +1,6 @@
 #pragma once
 /// Tensors block by block: those of a file, a generator, an array or a grid. This is what fields are made of.
 
-#include <cstddef>
 #include <functional>
 #include <map>
 #include <string>

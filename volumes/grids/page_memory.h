@@ -3,7 +3,6 @@
 /// files: the system's page cache holds as many of them as there is room for, takes them away when memory is needed,
 /// and brings them back when they are used. Code that uses them does not notice.
 
-#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <mutex>

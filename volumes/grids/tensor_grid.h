@@ -4,7 +4,6 @@
 
 #include <array>
 #include <bitset>
-#include <cstddef>
 #include <deque>
 #include <functional>
 #include <map>

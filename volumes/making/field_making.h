@@ -2,7 +2,6 @@
 /// Makes a field of blocks in one pass: each block is read, cleaned, preprocessed and placed in its bricks while it is
 /// in the processor's caches, without a grid in between.
 
-#include <cstddef>
 #include <optional>
 #include <vector>
 

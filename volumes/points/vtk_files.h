@@ -3,7 +3,6 @@
 /// Rendering therefore needs no VTK, and where VTK prints or ends the process because a file is damaged, the caller
 /// gets an exception.
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>

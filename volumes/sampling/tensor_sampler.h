@@ -2,7 +2,6 @@
 /// The tensor at a point, in double precision; and at many points, in single precision, side by side.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <utility>
 

@@ -2,7 +2,6 @@
 /// Preprocessing of tensors by their eigenvalues (Zheng and Pang 2003, Eq. 7), and the eigenvalues themselves.
 
 #include <complex>
-#include <cstddef>
 #include <string>
 
 #include <Eigen/Core>

@@ -2,7 +2,6 @@
 /// The numbers that `tensorray info` prints about a field.
 
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Geometry>

@@ -2,7 +2,6 @@
 /// The folders of an OpenFOAM case, regions and the parts that processors wrote, the order of its tensors, and what the
 /// boundaryField of its fields prescribes for vectors at patches.
 
-#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <string>

@@ -2,7 +2,6 @@
 /// What readers of voxel files share: headers of text, and numbers that are plain bytes in any order of the axes.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>

@@ -1,7 +1,6 @@
 #pragma once
 /// Numbers at the voxels of a lattice, as read from a file of voxels, before they become a tensor grid.
 
-#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>

@@ -2,7 +2,6 @@
 /// A cell of a mesh, and its interpolation at a point in space.
 
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Geometry>

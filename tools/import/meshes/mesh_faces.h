@@ -1,7 +1,6 @@
 #pragma once
 /// The faces of a mesh's cells, and those on its outside.
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>

@@ -2,7 +2,6 @@
 /// The blocks of a lattice that are sampled.
 
 #include <bitset>
-#include <cstddef>
 #include <optional>
 #include <vector>
 

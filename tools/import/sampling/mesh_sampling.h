@@ -1,7 +1,6 @@
 #pragma once
 /// Samples tensors on a mesh at the voxels of a lattice.
 
-#include <cstddef>
 #include <optional>
 #include <variant>
 #include <vector>

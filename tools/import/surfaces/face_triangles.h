@@ -1,7 +1,6 @@
 #pragma once
 /// Triangles of the faces of cells, flat and curved.
 
-#include <cstddef>
 #include <vector>
 
 #include "base/geometry/triangle_mesh.h"

@@ -1,7 +1,6 @@
 #pragma once
 /// The surface of the body inside a mesh.
 
-#include <cstddef>
 #include <filesystem>
 
 class vtkDataSet;

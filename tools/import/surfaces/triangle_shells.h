@@ -1,7 +1,6 @@
 #pragma once
 /// Measures and cuts closed surfaces that are oriented outwards, of several shells that may touch or overlap.
 
-#include <cstddef>
 #include <vector>
 
 #include "base/geometry/triangle_mesh.h"

@@ -1,7 +1,6 @@
 #pragma once
 /// What all connections of a Server share. Private to the sources of the server: it includes Boost.
 
-#include <cstddef>
 #include <map>
 #include <memory>
 #include <optional>
