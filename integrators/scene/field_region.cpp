@@ -19,15 +19,12 @@ constexpr double face_thickness = 1e-3;  // Voxels: positions at the end of a ra
 constexpr std::size_t fewest_ways = 6;
 constexpr double max_change = 0.01;  // Of the jacobian, as predicted for the check.
 
-/// Nodes for so many ways: 3 for 8, 4 for 16, 6 for 32.
-std::size_t nodes_for(std::size_t ways) { return 3 + (ways - 1) / 8; }
-
 bool starts_alike(const BentRay& a, const BentRay& b) {
   return a.position == b.position && a.direction == b.direction && a.place == b.place && a.tolerance == b.tolerance;
 }
 
 void choose_nodes(BandGroup& group) {
-  const std::size_t count = nodes_for(group.count);
+  const std::size_t count = 3 + (group.count - 1) / 8;  // 3 for 8 ways, 4 for 16, 6 for 32.
   std::size_t widest = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const double turn = pi * static_cast<double>(i) / static_cast<double>(count - 1);

@@ -20,13 +20,6 @@ namespace {
 constexpr double default_wavelength = 550;  // nm
 constexpr Colormap map = Colormap::cool_warm;
 
-/// The geometry of the scene without the plate, on which rays would end.
-Geometry without_plate(const Scene& scene) {
-  Surfaces surfaces = scene.geometry.surfaces();
-  surfaces.plate.reset();
-  return Geometry(std::move(surfaces));
-}
-
 /// Settings for light of one flexibility along the beam. @throw SceneError if its length is 0.
 StretchSettings settings_of(const Scene& scene, const StretchDescription& description) {
   const BendingDescription& bending = scene.description.bending;
@@ -99,7 +92,9 @@ class LoadedStretch : public LoadedMethod {
     StretchSettings settings = settings_;
     settings.job = job;
     const OutputDescription& output = scene.description.output;
-    const Geometry geometry = without_plate(scene);
+    Surfaces surfaces = scene.geometry.surfaces();
+    surfaces.plate.reset();  // Rays would end on it.
+    const Geometry geometry(std::move(surfaces));
     Render result;
     result.metadata = metadata_of(settings_, scene.description);
     if (output.wants("stretch")) {

@@ -106,7 +106,8 @@ void shade_surface(Wavefront& front, PathState& path) {
   const Vertex& vertex = path.vertex;
   if (front.settings.shading == Shading::path) return follow_path(front, path);
   if (front.settings.shading == Shading::ambient_occlusion) return shade_occlusion(front, path);
-  ray_light(front, path) += path.throughput * (vertex.reflectance * -vertex.normal.dot(vertex.direction));  // Headlight.
+  ray_light(front, path) +=
+      path.throughput * (vertex.reflectance * -vertex.normal.dot(vertex.direction));  // Headlight.
 }
 
 }  // namespace tensorray

@@ -1,7 +1,6 @@
 #include "scenes/keys/json_reader.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -77,16 +76,13 @@ std::string reason(const std::string& what) {
   return closing ? text + " (is there an extra comma before it?)" : text;
 }
 
-bool is_blank(const std::string& text) {
-  return std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isspace(c); });
-}
-
 }  // namespace
 
 Json read_json_object(const std::filesystem::path& path) {
   const SceneSource source{path};
   const std::string text = read_text(source);
-  if (is_blank(text)) source.fail("is empty; a scene is a JSON object with `field` and `integrator`");
+  if (text.find_first_not_of(" \t\r\n\v\f") == std::string::npos)
+    source.fail("is empty; a scene is a JSON object with `field` and `integrator`");
   Json json;
   try {
     json = parse(text, true);

@@ -28,7 +28,6 @@
 #include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/flat_mesh.h"
 #include "tools/import/sampling/sampling_lattice.h"
-#include "tools/import/surfaces/mesh_boundary.h"
 #include "tools/import/surfaces/triangle_shells.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/mesh_formats.h"

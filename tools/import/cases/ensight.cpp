@@ -1,5 +1,3 @@
-#include "tools/import/cases/case_files.h"
-
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
@@ -21,6 +19,7 @@
 #include "base/errors.h"
 #include "base/files/temporary_folder.h"
 #include "base/text/text.h"
+#include "tools/import/cases/case_files.h"
 #include "tools/import/vtk_formats/array_names.h"
 
 namespace tensorray {

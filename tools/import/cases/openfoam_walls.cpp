@@ -1,5 +1,3 @@
-#include "tools/import/cases/openfoam.h"
-
 #include <algorithm>
 #include <optional>
 #include <regex>
@@ -14,6 +12,8 @@
 #include <vtkOpenFOAMReader.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+
+#include "tools/import/cases/openfoam.h"
 
 namespace tensorray {
 namespace {
