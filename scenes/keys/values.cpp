@@ -134,7 +134,7 @@ bool Value<Word>::read(const Json& json, const Limits&, Word& target) {
 }
 
 std::string Value<Word>::expectation(const Word& target, const Limits&) {
-  return fmt::format("one of \"{}\"", fmt::join(target.allowed, "\", \""));
+  return "one of \"" + joined(target.allowed, "\", \"") + "\"";
 }
 Json Value<Word>::schema(const Word& target, const Limits&) { return {{"enum", target.allowed}}; }
 Json Value<Word>::json(const Word& value) { return Value<std::string>::json(value.value); }
