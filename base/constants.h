@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/constants.h
 /// Mathematical constants.
 
 namespace tensorray {

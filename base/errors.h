@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/errors.h
 /// Errors are exceptions whose text is one line: what is wrong, where, and the fix. std::invalid_argument means that
 /// the user's input is wrong (exit status 2); every other exception means that the work failed (exit status 1).
 

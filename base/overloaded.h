@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/overloaded.h
 /// A function for each kind of a variant, as std::visit takes them: the compiler finds the kinds that are forgotten.
 
 namespace tensorray {

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/data_folder.h
 /// Where the tests find files that they do not make themselves.
 
 #include <filesystem>

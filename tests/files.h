@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/files.h
 /// For all tests: the bytes of files, files that vanish by themselves, full disks, and the messages of errors.
 
 #include <csignal>

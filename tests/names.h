@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/names.h
 /// What all tests have precompiled (CMakeLists.txt): GoogleTest, GoogleMock, Eigen, and what half of the tests use of
 /// the standard library, with the names that they use all the time. The headers that tests share include it.
 

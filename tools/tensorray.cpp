@@ -1,4 +1,3 @@
-/// @file tools/tensorray.cpp
 /// The program `tensorray`: selects the command.
 ///   tensorray --read-mesh EXCHANGE FILE    a mesh → the file that renderer/meshes/assimp_mesh.cpp reads, which alone
 ///                                          uses this

@@ -1,8 +1,6 @@
 #pragma once
-/// @file base/files/descriptor.h
 /// File descriptors of the system. Where this project needs one, and not a stream, it is a Descriptor.
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string_view>

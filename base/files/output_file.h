@@ -1,8 +1,6 @@
 #pragma once
-/// @file base/files/output_file.h
 /// Output files that are either complete or absent, and never those that a run reads.
 
-#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <string>

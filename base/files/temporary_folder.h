@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/files/temporary_folder.h
 /// Where temporary files are, and folders and files there that vanish by themselves.
 
 #include <filesystem>

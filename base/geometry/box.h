@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/geometry/box.h
 /// Boxes along the axes, and points.
 
 #include <algorithm>

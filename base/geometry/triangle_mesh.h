@@ -1,9 +1,7 @@
 #pragma once
-/// @file base/geometry/triangle_mesh.h
 /// Triangles: the one type that fields, importers and the renderer share.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>

@@ -1,9 +1,7 @@
 #pragma once
-/// @file base/process/archive.h
 /// Values as bytes, and back: what is kept in files of results, and what ranks give each other. One function copies a
 /// value both ways. Numbers have the byte order of the machine: all machines of a render must have the same.
 
-#include <cstddef>
 #include <cstring>
 #include <stdexcept>
 #include <string>

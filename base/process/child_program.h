@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/process/child_program.h
 /// Runs another program of this project, which is in the folder of the running program, or, where the running program
 /// is another one's (an interpreter that has loaded this code), in a folder that is named.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/process/job.h
 /// Long work as a list of units: a tile, rows of pixels, a part of the photons, a flow map. What a unit gives is a
 /// function of its number, the scene and the program alone, and is kept under its name. Four drivers use this:
 /// - a checkpoint is a file of all results so far; to resume is to begin with them;
@@ -8,7 +7,6 @@
 /// - ranks (ranks.h) make every Nth unit, and give it to the others.
 
 #include <atomic>
-#include <cstddef>
 #include <functional>
 #include <map>
 #include <memory>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/process/process_limits.h
 /// What this process may use of the machine.
 
 #include <filesystem>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/process/progress.h
 /// Long work reports its progress through a Progress, and checks there whether it was cancelled.
 
 #include <atomic>

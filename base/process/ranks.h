@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/process/ranks.h
 /// Processes that make one result together: each runs the same code, does every `count`-th unit of each step, and gives
 /// it to the others. As in MPI, rank 0 is the root.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/process/seconds.h
 /// Time that work takes, for statistics.
 
 #include <chrono>

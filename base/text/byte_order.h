@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/text/byte_order.h
 /// Reads and appends numbers of files, in either byte order.
 
 #include <algorithm>

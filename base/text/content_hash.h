@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/text/content_hash.h
 /// A hash by which changed or damaged bytes are noticed. It does not withstand forgery.
 
 #include <cstdint>

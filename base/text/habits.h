@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/text/habits.h
 /// Names that other renderers have for what a key of a scene does.
 
 #include <string>

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstddef>
 
 #include <fmt/core.h>
 #include <unistd.h>

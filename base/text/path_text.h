@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/text/path_text.h
 /// Paths as UTF-8, which JSON and other text formats need. A path of Linux is any bytes.
 
 #include <filesystem>

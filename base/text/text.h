@@ -1,5 +1,4 @@
 #pragma once
-/// @file base/text/text.h
 /// Small helpers for text.
 
 #include <filesystem>

@@ -17,7 +17,6 @@ namespace tensorray {
 namespace {
 
 using Eigen::Affine2d;
-using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
 constexpr double tolerance = 0.5;             // Wanted error of landings, pixels.
@@ -104,7 +103,7 @@ LensPoint make_point(const LensView& view, const Vector2d& pixel, const FlowPoin
   point.end = static_cast<LensEnd>(seen.end);
   if (seen.end != RayEnd::plate) return point;
   const Vector2d at = image_point(view, seen);
-  const Matrix2d by_pixel = image_by_pixel(view, seen);
+  const Eigen::Matrix2d by_pixel = image_by_pixel(view, seen);
   point.st = texture_coordinates(light, at);
   point.end = sees_image(light, point.st) ? LensEnd::image : LensEnd::outside;
   point.per_pixel = light.setup.image.plane.size.cwiseInverse().asDiagonal() * by_pixel;

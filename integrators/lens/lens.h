@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/lens/lens.h
 /// A known image seen through a tensor field (Zheng and Pang 2003, section on lens simulation).
 ///
 /// Light travels from the image to the receiver. The viewer stands behind the receiver and looks against the light.
@@ -9,7 +8,6 @@
 /// Both modes are a flow map (tracing/flow/flow_map.h) of a LensMap, which all bands share: `scatter` draws its
 /// mesh over the landings, `gather` traces from the receiver and draws its mesh over the starts.
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>

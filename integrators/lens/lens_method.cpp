@@ -329,12 +329,6 @@ Texture load_image(const LensDescription& lens, const Plate& receiver, const Col
   return {std::get<std::filesystem::path>(lens.image), color, lens.image_color_space, wrap, lens.image_layer, &notes};
 }
 
-/// The plate as it is seen from its other side.
-Plate from_behind(Plate plate) {
-  plate.right = -plate.right;
-  return plate;
-}
-
 /// The smallest rectangle in the proportions of the image that covers the receiver.
 Eigen::Vector2d covering_size(const Plate& receiver, const Texture& image) {
   const double aspect = static_cast<double>(image.width()) / image.height();
@@ -350,7 +344,8 @@ std::shared_ptr<Method> lens_method() { return std::make_shared<LensMethod>(); }
 
 LensScene load_lens(const Scene& scene, const LensDescription& lens, std::vector<std::string>& notes) {
   const Eigen::Vector3d& direction = scene.beam.direction;
-  const Plate receiver = from_behind(*scene.geometry.surfaces().plate);
+  Plate receiver = *scene.geometry.surfaces().plate;
+  receiver.right = -receiver.right;  // It is seen from its other side.
   LensScene result{load_image(lens, receiver, scene.color, notes), receiver, {}, goes_on(lens)};
 
   Plate plane = receiver;

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/lens/lens_method.h
 /// The method "lens": an image seen through the field. Its keys of `integrator`; lengths are in world units.
 
 #include <filesystem>

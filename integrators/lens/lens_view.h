@@ -1,8 +1,6 @@
 #pragma once
-/// @file integrators/lens/lens_view.h
 /// What the points of a lens's picture see of the image, in all of its light, and the light of its pixels.
 
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Geometry>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/methods/read_scene.h
 /// Scene file → SceneDescription. Reads no other file.
 
 #include <filesystem>

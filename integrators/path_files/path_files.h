@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/path_files/path_files.h
 /// Paths as files. The file's ending selects the format.
 ///
 /// `.vtp`, VTK polydata (ParaView): one polyline for each path. The file holds all data of a path. A path that is read

@@ -116,9 +116,6 @@ Eigen::Vector3d read_triplet(std::ifstream& file, const Header& header) {
   return triplet;
 }
 
-bool all_nan(const Eigen::Vector3d& triplet) { return triplet.array().isNaN().all(); }
-bool all_infinite(const Eigen::Vector3d& triplet) { return triplet.array().isInf().all(); }
-
 }  // namespace
 
 void write_tck_paths(const std::filesystem::path& path, const std::vector<Path>& paths) {
@@ -154,8 +151,8 @@ std::vector<Path> read_tck_paths(const std::filesystem::path& path) {
       positions.push_back(triplet);
       continue;
     }
-    const bool ends = all_infinite(triplet);
-    if (!ends && !all_nan(triplet))
+    const bool ends = triplet.array().isInf().all();
+    if (!ends && !triplet.array().isNaN().all())
       throw std::runtime_error("a point of track " + std::to_string(count) + " is not finite; the file is damaged");
     if (!ends || !positions.empty()) {
       ++count;

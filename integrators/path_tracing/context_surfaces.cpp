@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
@@ -178,26 +177,19 @@ ShadedSurface make_isosurface(const Scene& scene, const IsosurfaceDescription& d
 }
 
 MaterialSettings settings_of(const MaterialDescription& description, const std::vector<Band>& bands) {
-  switch (description.kind) {
-    case MaterialKind::diffuse:
-      return Diffuse{};
-    case MaterialKind::principled: {
-      Principled principled;
-      principled.metallic = description.metallic;
-      principled.roughness = description.roughness;
-      principled.specular = description.specular;
-      principled.clearcoat = description.clearcoat;
-      return principled;
-    }
-    case MaterialKind::metal: {
-      std::vector<double> wavelengths;
-      for (const Band& band : bands) wavelengths.push_back(band.wavelength);
-      return RoughConductor{description.roughness, metal_index(choice_name(description.metal), wavelengths)};
-    }
-    case MaterialKind::glass:
-      return RoughDielectric{description.roughness, description.index};
+  if (description.kind == MaterialKind::diffuse) return Diffuse{};
+  if (description.kind == MaterialKind::glass) return RoughDielectric{description.roughness, description.index};
+  if (description.kind == MaterialKind::metal) {
+    std::vector<double> wavelengths;
+    for (const Band& band : bands) wavelengths.push_back(band.wavelength);
+    return RoughConductor{description.roughness, metal_index(choice_name(description.metal), wavelengths)};
   }
-  throw std::logic_error("unknown kind of material");
+  Principled principled;
+  principled.metallic = description.metallic;
+  principled.roughness = description.roughness;
+  principled.specular = description.specular;
+  principled.clearcoat = description.clearcoat;
+  return principled;
 }
 
 }  // namespace

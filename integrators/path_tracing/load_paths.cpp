@@ -57,25 +57,17 @@ SeedList seed_list(const Scene& scene, const SeedDescription& seeds) {
   const Beam& beam = scene.beam;
   const std::uint64_t seed = scene.description.seed;
   const Eigen::AlignedBox3d box = field.world_box();
-  switch (seeds.kind) {
-    case SeedKind::grid:
-      return {grid_seeds(beam, seeds.count), {}};
-    case SeedKind::poisson_disk:
-      return {poisson_disk_seeds(beam, seeds.count, seed), {}};
-    case SeedKind::line:
-      return {line_positions(seeds, box, beam), {}};
-    case SeedKind::sphere:
-      return {sphere_seeds(seeds.center.value_or(box.center()), seeds.radius.value_or(box.sizes().minCoeff() / 4),
-                           seeds.count, seed),
-              {}};
-    case SeedKind::threshold:
-      return {threshold_positions(seeds, field, seed), {}};
-    case SeedKind::file:
-      if (seeds.file.empty())
-        throw std::invalid_argument("the kind \"file\" needs `file`, a text file with x y z in each line");
-      return turned(read_seeds(seeds.file), scene.description.turn());
-  }
-  throw std::logic_error("unknown kind of seeds");
+  if (seeds.kind == SeedKind::grid) return {grid_seeds(beam, seeds.count), {}};
+  if (seeds.kind == SeedKind::poisson_disk) return {poisson_disk_seeds(beam, seeds.count, seed), {}};
+  if (seeds.kind == SeedKind::line) return {line_positions(seeds, box, beam), {}};
+  if (seeds.kind == SeedKind::threshold) return {threshold_positions(seeds, field, seed), {}};
+  if (seeds.kind == SeedKind::sphere)
+    return {sphere_seeds(seeds.center.value_or(box.center()), seeds.radius.value_or(box.sizes().minCoeff() / 4),
+                         seeds.count, seed),
+            {}};
+  if (seeds.file.empty())
+    throw std::invalid_argument("the kind \"file\" needs `file`, a text file with x y z in each line");
+  return turned(read_seeds(seeds.file), scene.description.turn());
 }
 
 /// The channels that are followed from every seed: all of them if the colour of paths is their wavelength, otherwise

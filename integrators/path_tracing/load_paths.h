@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/path_tracing/load_paths.h
 /// What path tracing needs in addition to the field: the rays to follow, and the light that shows their paths.
 
 #include <vector>

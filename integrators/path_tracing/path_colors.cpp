@@ -4,7 +4,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "renderer/charts/color_bar.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "volumes/tensors/invariants.h"
 
@@ -18,37 +17,25 @@ double transverse_force(const PathPoint& point) {
   return (force - point.direction.dot(force) * point.direction).norm();
 }
 
+/// Of colours by a number; empty for the others.
 std::function<double(const PathPoint&)> value_of(const PathColorDescription& description) {
-  switch (description.by) {
-    case PathColor::force:
-      return [](const PathPoint& point) { return point.force().norm(); };
-    case PathColor::transverse_force:
-      return transverse_force;
-    case PathColor::curvature:
-      return [](const PathPoint& point) { return point.change.norm(); };
-    case PathColor::length:
-      return [](const PathPoint& point) { return point.length; };
-    case PathColor::invariant:
-      return [which = description.invariant](const PathPoint& point) { return invariant(which, point.tensor); };
-    default:
-      return {};
-  }
+  const PathColor by = description.by;
+  if (by == PathColor::force) return [](const PathPoint& point) { return point.force().norm(); };
+  if (by == PathColor::transverse_force) return transverse_force;
+  if (by == PathColor::curvature) return [](const PathPoint& point) { return point.change.norm(); };
+  if (by == PathColor::length) return [](const PathPoint& point) { return point.length; };
+  if (by != PathColor::invariant) return {};
+  return [which = description.invariant](const PathPoint& point) { return invariant(which, point.tensor); };
 }
 
 /// Words below each other, and the unit.
 std::string title_of(const PathColorDescription& description, const FieldUnits& units) {
-  switch (description.by) {
-    case PathColor::force:
-      return "|T V|\n" + units.tensor;
-    case PathColor::transverse_force:
-      return "|T V|\nacross\n" + units.tensor;
-    case PathColor::curvature:
-      return units.length.empty() ? "|V'|" : "|V'|\n1/" + units.length;
-    case PathColor::invariant:
-      return invariant_title(description.invariant, units);
-    default:
-      return choice_name(description.by) + ("\n" + units.length);
-  }
+  const PathColor by = description.by;
+  if (by == PathColor::force) return "|T V|\n" + units.tensor;
+  if (by == PathColor::transverse_force) return "|T V|\nacross\n" + units.tensor;
+  if (by == PathColor::curvature) return units.length.empty() ? "|V'|" : "|V'|\n1/" + units.length;
+  if (by == PathColor::invariant) return invariant_title(description.invariant, units);
+  return choice_name(by) + ("\n" + units.length);
 }
 
 ValueRange range_of(const PathColorDescription& description, const std::vector<Path>& paths,

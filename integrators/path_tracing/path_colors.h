@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/path_tracing/path_colors.h
 /// Colours for the values along a path, and the surfaces of paths: tubes, wires, ellipses or lines.
 
 #include <filesystem>

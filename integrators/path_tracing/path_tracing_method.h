@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/path_tracing/path_tracing_method.h
 /// The method "path_tracing": a picture of bent rays as tubes in light. The keys of `integrator` that it has; lengths
 /// are in world units, angles in degrees.
 

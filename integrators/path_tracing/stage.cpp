@@ -1,7 +1,6 @@
 #include "integrators/path_tracing/stage.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/path_tracing/stage.h
 /// What all pictures of surfaces share: camera, lights, visible lamps, settings of the path tracer, and channels.
 
 #include <filesystem>

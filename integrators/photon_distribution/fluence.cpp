@@ -158,9 +158,7 @@ ScalarGrid FluenceSums::grid_of(std::size_t first_plane, const std::vector<doubl
       block.values[offset] = static_cast<float>(value * unit / part_within(field_.index_bounds(), voxel));
     }
   });
-  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
-                                   [](const ScalarBlock& block) { return block.active.none(); }),
-                    grid.blocks.end());
+  remove_empty_blocks(grid.blocks);
   return grid;
 }
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/photon_distribution/fluence.h
 /// The fluence of light inside the volume, for each voxel.
 
 #include <atomic>

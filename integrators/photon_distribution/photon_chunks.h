@@ -1,8 +1,6 @@
 #pragma once
-/// @file integrators/photon_distribution/photon_chunks.h
 /// Traces photons in chunks of positions. What a chunk gives is a function of its number alone.
 
-#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>

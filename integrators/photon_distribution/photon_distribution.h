@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/photon_distribution/photon_distribution.h
 /// Density of light on a plate behind a field (Zheng and Pang 2003, section on photon distribution).
 
 #include <cstdint>

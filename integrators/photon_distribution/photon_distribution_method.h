@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/photon_distribution/photon_distribution_method.h
 /// The method "photon_distribution": the bent light on the plate and inside the volume.
 
 #include <memory>

@@ -14,7 +14,6 @@
 namespace tensorray {
 namespace {
 
-using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
@@ -95,7 +94,8 @@ PlateLanding landing_of(const FlowPoint& point, const Vector2d& pixel, const Pla
                         const Eigen::Affine2d& straight) {
   // World units on the plate, along right and up, by those across the beam.
   const Vector2d pixel_size = plate.pixel_size();
-  const Matrix2d jacobian = Vector2d(pixel_size.x(), -pixel_size.y()).asDiagonal() * point.jacobian.cast<double>();
+  const Eigen::Matrix2d jacobian =
+      Vector2d(pixel_size.x(), -pixel_size.y()).asDiagonal() * point.jacobian.cast<double>();
   return {point, plate.to_world(pixel) - plate.to_world(straight.inverse() * point.other.cast<double>()),
           principal_stretch(jacobian)};
 }

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/photon_distribution/plate_light.h
 /// The light of a scene on its plate and inside its volume.
 
 #include <functional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/polariscope/differences.h
 /// a = u·T u − w·T w and b = u·(T + Tᵀ) w at the Gauss points of steps. These two are linear in T: the coefficients of
 /// a brick become those of a and b. Rays side by side are mostly in one cell, whose coefficients are loaded once.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/polariscope/elements.h
 /// The elements of a polariscope before and after the specimen, and the power that they let through.
 /// Polarisation is in the frame (u, w) across the light, in which the picture is seen: u to the right, w up.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/polariscope/load_polariscope.h
 /// From the settings of a scene to the light that is traced; and what the picture's colours mean.
 
 #include <functional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/polariscope/polariscope.h
 /// Polarised light through a field that turns its polarisation and bends nothing (integrated photoelasticity: H. Aben
 /// and C. Guillemet, Photoelasticity of Glass, 1993). Light travels straight along k; u and w span the plane across it:
 ///   a = u·T u − w·T w,   b = u·(T + Tᵀ) w,   dE/dz = −i (π C/λ) [[a, b], [b, −a]] E.

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/polariscope/polariscope_method.h
 /// The method "polariscope": polarised light through the field, between polarisers. The keys of `integrator` that it
 /// has.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/polariscope/turning.h
 /// How the steps of rays turn polarisation: rays side by side, then wavelengths side by side.
 
 #include <cstddef>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/scene/field_light.h
 /// The lights of the method "scene", and the light that they throw through the field on its objects. Each pair of a
 /// light and an object has either photons (photons.cpp) or a flow map (sunlight.cpp).
 

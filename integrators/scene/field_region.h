@@ -1,12 +1,10 @@
 #pragma once
-/// @file integrators/scene/field_region.h
 /// A tensor field in the view of a camera. Light is followed backwards, by Eq. 5 with −s. If there are no obstacles,
 /// some ways that allow a tolerance are interpolated (BandGroup). The traced ways of their group must leave the volume
 /// through the same face of its box.
 
 #include <array>
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>

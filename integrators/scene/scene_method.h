@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/scene/scene_method.h
 /// The method "scene": surfaces lit by light that the field bends, seen by a camera whose rays it bends, too. Its own
 /// keys of `integrator`; it shares others with path tracing.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/seeds/seeds.h
 /// Positions from which paths are followed.
 
 #include <cstdint>

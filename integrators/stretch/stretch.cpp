@@ -124,9 +124,7 @@ ScalarGrid stretch_grid(const TensorField& field, const Geometry& geometry, cons
       else
         block.active.set(offset);
     }
-  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
-                                   [](const ScalarBlock& block) { return block.active.none(); }),
-                    grid.blocks.end());
+  remove_empty_blocks(grid.blocks);
   return grid;
 }
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/stretch/stretch.h
 /// How fast a field separates neighbouring rays of parallel light: the finite-time Lyapunov exponent (G. Haller,
 /// Distinguished material surfaces and coherent structures in three-dimensional fluid flows, Physica D 149, 2001) of
 /// the flow along the rays. Length along the ray takes the place of time.

@@ -20,13 +20,6 @@ namespace {
 constexpr double default_wavelength = 550;  // nm
 constexpr Colormap map = Colormap::cool_warm;
 
-/// The geometry of the scene without the plate, on which rays would end.
-Geometry without_plate(const Scene& scene) {
-  Surfaces surfaces = scene.geometry.surfaces();
-  surfaces.plate.reset();
-  return Geometry(std::move(surfaces));
-}
-
 /// Settings for light of one flexibility along the beam. @throw SceneError if its length is 0.
 StretchSettings settings_of(const Scene& scene, const StretchDescription& description) {
   const BendingDescription& bending = scene.description.bending;
@@ -65,9 +58,9 @@ ChannelTable<StretchPixel> stretch_channels() {
 
 /// Makes the pictures from the values at the pixels of the entry plane, which is seen along the light as the plate is.
 void draw(const Scene& scene, const std::vector<float>& values, const Eigen::Vector2i& resolution, Render& render) {
-  ValueRange range = choose_range({values.begin(), values.end()});
-  range.high = std::max(std::abs(range.low), std::abs(range.high));  // 0 has the middle of the colours.
-  range.low = -range.high;
+  RangeChoice choice;
+  choice.symmetric = true;  // 0 has the middle of the colours.
+  const ValueRange range = choose_range({values.begin(), values.end()}, choice);
   const Eigen::Matrix3d to_working = scene.color.xyz_to_working() * rec709_to_xyz();
   const ChannelTable<StretchPixel> table = stretch_channels();
   Image linear(resolution.x(), resolution.y(), channel_names(table));
@@ -99,7 +92,9 @@ class LoadedStretch : public LoadedMethod {
     StretchSettings settings = settings_;
     settings.job = job;
     const OutputDescription& output = scene.description.output;
-    const Geometry geometry = without_plate(scene);
+    Surfaces surfaces = scene.geometry.surfaces();
+    surfaces.plate.reset();  // Rays would end on it.
+    const Geometry geometry(std::move(surfaces));
     Render result;
     result.metadata = metadata_of(settings_, scene.description);
     if (output.wants("stretch")) {
@@ -144,10 +139,7 @@ class StretchMethod : public MethodWith<StretchKeys> {
   }
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
-    if (chosen && !given(json, "/output/annotations")) {
-      scene.output.annotations = {Annotation::legend};
-      scene.output.default_annotations = true;
-    }
+    if (chosen) default_annotations(scene, json, {Annotation::legend});
     if (chosen && scene.bending.rgb && settings().stretch.wavelength)
       source.fail(
           "`/integrator/stretch/wavelength`: light has no wavelength where `/bending/rgb` is given; remove one "

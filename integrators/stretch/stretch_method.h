@@ -1,5 +1,4 @@
 #pragma once
-/// @file integrators/stretch/stretch_method.h
 /// The method "stretch": how much the field of a scene stretches the distance of neighbouring rays
 /// (integrators/stretch/stretch.h), as a grid and as a picture.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file python/module/arrays.h
 /// NumPy arrays of C++ memory, and the other way round. All functions need the GIL.
 
 #include <memory>

@@ -1,4 +1,3 @@
-/// @file python/module/module.cpp
 /// The module tensorray._tensorray. The package beside it (python/tensorray) has the functions for users; it makes
 /// their arguments plain, so that the functions here have no defaults.
 

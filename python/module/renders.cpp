@@ -82,12 +82,6 @@ std::shared_ptr<Rendered> render_for_python(const SceneRequest& request, const s
   return rendered;
 }
 
-/// Finds what would be an error of each shard, or after all of them, before the first one begins.
-void check_shards(const SceneRequest& request) {
-  const RequestedScene requested = read_request(request);
-  open_requested(requested);
-}
-
 /// What `tensorray render --shard` does.
 void render_shard(const SceneRequest& request, const WorkPart& part, const std::filesystem::path& file,
                   const Progress& progress) {
@@ -177,7 +171,8 @@ void add_renders(py::module_& module) {
       .def("warnings", [](const Rendered& self) { return self.render.warnings; })
       .def("write", &write_more);
   module.def("render", &render_for_python);
-  module.def("check_shards", &check_shards);
+  // Finds what would be an error of each shard, or after all of them, before the first one begins.
+  module.def("check_shards", [](const SceneRequest& request) { open_requested(read_request(request)); });
   module.def("render_shard", [](const SceneRequest& request, std::size_t index, std::size_t count,
                                 const std::filesystem::path& file, int threads, const py::object& report) {
     run(report, threads, [&](const Progress& progress) { render_shard(request, {index, count}, file, progress); });

@@ -1,5 +1,4 @@
 #pragma once
-/// @file python/module/scene_request.h
 /// A tensor field as Python holds it, a scene as Python asks for it, and words of scene files as arguments.
 
 #include <filesystem>

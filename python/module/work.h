@@ -1,5 +1,4 @@
 #pragma once
-/// @file python/module/work.h
 /// Long work for Python: without the GIL, with progress, and ended by Ctrl-C.
 
 #include <functional>

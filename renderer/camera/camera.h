@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/camera/camera.h
 /// The camera that takes a picture.
 
 #include <optional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/camera/path_tracer.h
 /// Renders pictures of surfaces by path tracing.
 
 #include <atomic>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/camera/pixel_filter.h
 /// Filters that weigh the light around a pixel's centre.
 
 #include <vector>

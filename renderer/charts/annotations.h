@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/charts/annotations.h
 /// Small drawings that say how to read a picture: a scale bar and the axes of the world in its corners, directions of a
 /// patient at its edges, a caption below it. And the lines of bodies over it.
 

@@ -1,8 +1,6 @@
 #pragma once
-/// @file renderer/charts/color_bar.h
 /// Legends drawn into pictures: a labelled colour bar for numbers, and a key that lists colours and their meanings.
 
-#include <cstddef>
 #include <functional>
 #include <string>
 #include <vector>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/charts/colormap.h
 /// Colours for numbers: perceptually uniform colour maps, and the range of values that a map covers.
 
 #include <vector>

@@ -1,7 +1,6 @@
 #include "renderer/charts/ink.h"
 
 #include <cmath>
-#include <cstddef>
 #include <stdexcept>
 
 #include <tbb/parallel_for.h>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/charts/ink.h
 /// Draws lines, grids and areas of one colour over pictures, anti-aliased.
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/charts/lettering.h
 /// Labels in pictures. The stroke font is built in, because installed fonts differ between machines.
 
 #include <string>

@@ -11,12 +11,6 @@ using Eigen::Vector3d;
 
 Vector2d chromaticity_of(const Vector3d& xyz) { return xyz.head<2>() / xyz.sum(); }
 
-Matrix3d bradford_cones() {
-  Matrix3d cones;
-  cones << 0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296;
-  return cones;
-}
-
 }  // namespace
 
 Chromaticities chromaticities_of(const std::array<double, 8>& n) {
@@ -38,7 +32,8 @@ Matrix3d rgb_to_xyz(const Chromaticities& colors) {
 
 std::optional<Matrix3d> adaptation(const Vector3d& from, const Vector3d& to) {
   constexpr double min_response = 0.01;
-  const Matrix3d cones = bradford_cones();
+  Matrix3d cones;  // Of Bradford.
+  cones << 0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296;
   const Vector3d response = (cones * from).cwiseQuotient(cones * to);
   if (!(response.minCoeff() > min_response)) return std::nullopt;
   return cones.inverse() * response.cwiseInverse().asDiagonal() * cones;

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/color/chromaticities.h
 /// Colours by their CIE chromaticities, and adaptation from one white to another.
 
 #include <array>

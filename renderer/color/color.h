@@ -1,9 +1,7 @@
 #pragma once
-/// @file renderer/color/color.h
 /// Conversion from CIE XYZ to the scene-linear working space, and from there to a display, by OpenColorIO.
 
 #include <array>
-#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <memory>

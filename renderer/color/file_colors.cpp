@@ -17,7 +17,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Matrix3f;
 using Eigen::Vector2d;
-using Eigen::Vector3d;
 using Eigen::Vector3f;
 
 /// From the values that a picture stores to light.
@@ -105,7 +104,7 @@ double difference(const ColorConversion& a, const ColorConversion& b, bool grey)
   return greatest;
 }
 
-const Vector3d profile_white(0.9642, 1, 0.8249);  // D50, as the format rounds it.
+const Eigen::Vector3d profile_white(0.9642, 1, 0.8249);  // D50, as the format rounds it.
 
 struct FreeIcc {
   void operator()(void* profile) const { cmsCloseProfile(profile); }

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/color/file_colors.h
 /// What the tags of a picture file mean: how its values become light.
 
 #include <optional>

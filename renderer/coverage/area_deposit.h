@@ -1,9 +1,7 @@
 #pragma once
-/// @file renderer/coverage/area_deposit.h
 /// Exact deposit of light on pixels: each pixel gets the area that it shares with each triangle.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

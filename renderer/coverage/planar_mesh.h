@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/coverage/planar_mesh.h
 /// Finds the triangles that cover a point, in a planar mesh that may fold over itself.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/density/density.h
 /// Density estimation: computes power per pixel from photons on a plate.
 
 #include <atomic>

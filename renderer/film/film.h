@@ -1,8 +1,6 @@
 #pragma once
-/// @file renderer/film/film.h
 /// Light that a plate collects, by pixels or as photons.
 
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>

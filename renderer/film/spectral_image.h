@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/film/spectral_image.h
 /// Conversion of the light on a film to RGB and spectral pictures; how far two pictures are apart.
 
 #include <vector>

@@ -1,9 +1,7 @@
 #pragma once
-/// @file renderer/images/formats.h
 /// How picture files are encoded and decoded, for image.h. Errors are std::runtime_error without the file's name.
 
 #include <algorithm>
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>

@@ -1,9 +1,7 @@
 #pragma once
-/// @file renderer/images/image.h
 /// A picture in memory, and the functions that read and write files (OpenImageIO; EXR and PNG without).
 
 #include <array>
-#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <memory>

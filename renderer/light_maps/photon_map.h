@@ -1,12 +1,10 @@
 #pragma once
-/// @file renderer/light_maps/photon_map.h
 /// Photons where they have landed on surfaces, and the irradiance that they give (Jensen 1996). The photons of one pass
 /// have one radius. Over the passes it shrinks, so that the mean over them converges to the truth (Knaus and Zwicker
 /// 2011, "Progressive Photon Mapping: A Probabilistic Approach").
 
 #include <algorithm>
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/light_maps/photon_tracer.h
 /// Traces photons of directional, point and area lights through a bending region to surfaces behind and within it.
 
 #include <cstdint>

@@ -179,19 +179,11 @@ bool BeamSampler::sample(std::uint64_t index, Emission& emission) const {
 
 Eigen::Vector3d BeamSampler::unit_sample(std::uint64_t index) const {
   const auto uniform = [&](std::uint32_t dimension) { return random_uniform(seed_, index, dimension); };
-  switch (pattern_) {
-    case BeamPattern::grid:
-      return cell_sample(index, {0.5, 0.5});
-    case BeamPattern::stratified:
-      return cell_sample(index, {uniform(0), uniform(1)});
-    case BeamPattern::sobol: {
-      const auto i = static_cast<std::uint32_t>(index);
-      return {sobol(seed_, i, 0), sobol(seed_, i, 1), sobol(seed_, i, 2)};
-    }
-    case BeamPattern::random:
-      break;
-  }
-  return {uniform(0), uniform(1), uniform(2)};
+  if (pattern_ == BeamPattern::grid) return cell_sample(index, {0.5, 0.5});
+  if (pattern_ == BeamPattern::stratified) return cell_sample(index, {uniform(0), uniform(1)});
+  if (pattern_ == BeamPattern::random) return {uniform(0), uniform(1), uniform(2)};
+  const auto i = static_cast<std::uint32_t>(index);
+  return {sobol(seed_, i, 0), sobol(seed_, i, 1), sobol(seed_, i, 2)};
 }
 
 /// A position in a cell of a lattice. The stratum is a rank-1 lattice over the cells: cells with similar strata are

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/lights/beam.h
 /// A beam of light that passes through an aperture.
 
 #include <cstdint>

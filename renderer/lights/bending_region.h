@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/lights/bending_region.h
 /// A region of space in which light does not go straight, as shading sees it.
 
 #include <optional>

@@ -1,10 +1,8 @@
 #pragma once
-/// @file renderer/lights/lights.h
 /// The lights of a scene, and how to sample directions towards them. Radiance is given for each band, relative to the
 /// light that the bands are made from: see Band.
 
 #include <algorithm>
-#include <cstddef>
 #include <limits>
 #include <memory>
 #include <optional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/lights/photon_emitter.h
 /// Photons that a directional light, a point or an area light sends towards a volume, or within it.
 
 #include <optional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/materials/material.h
 /// How a surface scatters light. For the frame, f and bands, see renderer/materials/scattering.h.
 
 #include <optional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/materials/metal_and_glass.h
 /// Rough surfaces of metals, with a complex index of refraction, and of glass and similar materials.
 
 #include <string>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/materials/microfacet.h
 /// Rough surfaces as many small mirrors (facets): the isotropic GGX distribution of Trowbridge and Reitz with Smith's
 /// height-correlated masking (Walter et al. 2007; Heitz 2014), and Fresnel's reflectances. Also tables over the angle,
 /// with which models return the light that more than one bounce between the facets would scatter.

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/materials/principled.h
 /// A material for most purposes, with parameters that artists are used to (Burley 2012, "Physically Based Shading at
 /// Disney"): plastic to metal, optionally with a coat of lacquer.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/materials/reflectance_table.h
 /// Reflectances of colours in the rendered bands, fast enough for every surface that a path meets.
 
 #include <vector>

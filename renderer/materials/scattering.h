@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/materials/scattering.h
 /// Conventions that all models of scattering at a surface share.
 ///
 /// Frame: local; +z is the surface's normal. `wi` (towards the light) and `wo` (towards the viewer) are unit vectors

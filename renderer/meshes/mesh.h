@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/meshes/mesh.h
 /// Triangle meshes and their files: .ply, .obj, .stl, .off, .gltf, .glb, .dae, .fbx. mesh_readers.h reads the formats.
 
 #include <filesystem>

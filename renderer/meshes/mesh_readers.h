@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/meshes/mesh_readers.h
 /// The formats that read_mesh (mesh.h) reads. Vertices are as in the file: not joined, and not checked to be finite.
 /// Errors are std::runtime_error with the reason, without the file's name.
 

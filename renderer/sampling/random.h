@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/sampling/random.h
 /// Random and low-discrepancy numbers as pure functions of (seed, index, dimension), so that a picture does not depend
 /// on the number of threads. There is no state: any thread may call every function.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/sampling/sampling.h
 /// Low-discrepancy numbers for a light path, warps from the unit square to other domains, and discrete distributions.
 /// Everything here is a pure function, or belongs to one thread.
 

@@ -6,8 +6,6 @@
 namespace tensorray {
 namespace {
 
-using Eigen::Vector3d;
-
 constexpr std::uint32_t first_bent_dimension = 1u << 20;  ///< For wavelengths within their bands; one for each depth.
 constexpr double part_of_pixel = 0.2;                     ///< That the bent light of the camera may miss.
 
@@ -35,7 +33,7 @@ BentView bent_view(const BentPaths& traced, const WaitingPath& waiting) {
   for (std::size_t i = waiting.first; i < waiting.last; ++i) {
     const BentRay& ray = traced.rays[i];
     if (!ray.arrives) continue;
-    const Vector3d& before = waiting.direction;
+    const Eigen::Vector3d& before = waiting.direction;
     view.radiance_scale += ray.radiance_scale / count;
     view.deflection += std::atan2(ray.direction.cross(before).norm(), ray.direction.dot(before)) / count;
     ++arrived;

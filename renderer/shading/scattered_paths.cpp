@@ -104,14 +104,10 @@ void shade_occlusion(Wavefront& front, const PathState& path) {
 
 void shade_surface(Wavefront& front, PathState& path) {
   const Vertex& vertex = path.vertex;
-  switch (front.settings.shading) {
-    case Shading::path:
-      return follow_path(front, path);
-    case Shading::ambient_occlusion:
-      return shade_occlusion(front, path);
-    case Shading::headlight:
-      ray_light(front, path) += path.throughput * (vertex.reflectance * -vertex.normal.dot(vertex.direction));
-  }
+  if (front.settings.shading == Shading::path) return follow_path(front, path);
+  if (front.settings.shading == Shading::ambient_occlusion) return shade_occlusion(front, path);
+  ray_light(front, path) +=
+      path.throughput * (vertex.reflectance * -vertex.normal.dot(vertex.direction));  // Headlight.
 }
 
 }  // namespace tensorray

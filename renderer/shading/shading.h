@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/shading/shading.h
 /// The light that a ray sees: path tracing (Kajiya 1986; Veach 1997) and two fast previews.
 ///
 /// The stages stand in files of their own, as free functions of the batch and of a path (wavefront.h):

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/shading/wavefront.h
 /// The stages of shading, and what they share: rays that are shaded together, the light they have seen, and its path.
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/spectra/reflectance.h
 /// Conversion of colours to smooth reflectance spectra.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/spectra/spectrum.h
 /// Spectra, the CIE 1931 observer, and the bands in which the renderer samples light. Wavelengths are in nanometres.
 
 #include <filesystem>

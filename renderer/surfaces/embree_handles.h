@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/surfaces/embree_handles.h
 /// The only file that includes Embree; private to the scenes that use it. Embree 3 and 4 have the same owning handles.
 
 #if __has_include(<embree4/rtcore.h>)

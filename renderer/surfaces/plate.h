@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/surfaces/plate.h
 /// The plate (scene key: receiver): a rectangle that collects light.
 
 #include <vector>

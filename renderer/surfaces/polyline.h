@@ -1,8 +1,6 @@
 #pragma once
-/// @file renderer/surfaces/polyline.h
 /// Leaves out the points of a polyline that can be interpolated from their neighbours.
 
-#include <cstddef>
 #include <vector>
 
 namespace tensorray {

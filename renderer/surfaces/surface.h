@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/surfaces/surface.h
 /// The surfaces that a picture shows, as plain data.
 
 #include <cstdint>

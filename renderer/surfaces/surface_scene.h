@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/surfaces/surface_scene.h
 /// Intersects rays with surfaces and returns what shading needs at the hit.
 
 #include <cstdint>

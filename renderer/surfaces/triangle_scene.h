@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/surfaces/triangle_scene.h
 /// Intersects rays and points with triangles, by Embree.
 
 #include <array>

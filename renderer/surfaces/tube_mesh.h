@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/surfaces/tube_mesh.h
 /// Triangle meshes of tubes with elliptical cross sections.
 
 #include <cstdint>

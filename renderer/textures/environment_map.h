@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/textures/environment_map.h
 /// Light that comes from infinitely far away in all directions, given by a picture.
 
 #include <vector>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/textures/test_images.h
 /// Built-in pictures that are seen through a lens.
 
 #include "renderer/images/image.h"

@@ -1,5 +1,4 @@
 #pragma once
-/// @file renderer/textures/texture.h
 /// A picture whose look-ups are filtered over the area that a pixel sees.
 
 #include <filesystem>

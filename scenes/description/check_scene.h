@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/description/check_scene.h
 /// Checks rules between several values of a scene file. The limits of each single value are checked by the reader.
 
 #include "base/files/output_file.h"

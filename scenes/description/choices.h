@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/description/choices.h
 /// Names in scene files for the enumerations that several methods or the whole scene use (see scenes/keys/values.h).
 
 #include <string>

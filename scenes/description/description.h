@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/description/description.h
 /// A scene file as plain data: the values that the file gives, and defaults for the others. No other file is loaded.
 /// Lengths are in world units (those of the field), wavelengths in nm.
 

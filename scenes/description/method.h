@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/description/method.h
 /// The interface between a scene and the methods that make pictures of it. A method defines its keys, what it loads,
 /// how it renders and what it writes. All other code uses a method through this interface.
 /// integrators/methods/methods.cpp lists the methods.

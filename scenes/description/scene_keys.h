@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/description/scene_keys.h
 /// The table of all keys of a scene file except those of the methods, which have their own tables.
 
 #include <filesystem>

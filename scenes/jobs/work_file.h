@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/jobs/work_file.h
 /// Files that hold results of a render: checkpoints and shards.
 
 #include <filesystem>

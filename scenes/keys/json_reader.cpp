@@ -1,9 +1,7 @@
 #include "scenes/keys/json_reader.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
-#include <cstddef>
 #include <cstring>
 #include <fstream>
 #include <set>
@@ -37,33 +35,19 @@ std::string read_text(const SceneSource& source) {
   return text;
 }
 
-/// A callback of the parser that refuses repeated keys and deep nesting, which JSON allows.
-class StrictRules {
- public:
-  bool operator()(int depth, Json::parse_event_t event, Json& parsed) {
-    using Event = Json::parse_event_t;
-    if (event == Event::object_start || event == Event::array_start)
-      if (depth >= nesting_limit) throw SceneError(fmt::format("is nested deeper than {} levels", nesting_limit));
-    if (event == Event::object_start) {
-      keys_.emplace_back();
-    } else if (event == Event::object_end) {
-      keys_.pop_back();
-    } else if (event == Event::key) {
-      const auto& key = parsed.get_ref<const std::string&>();
-      if (!keys_.back().insert(key).second)
-        throw SceneError(fmt::format("key `{}` is given twice in the same object; remove one", key));
-    }
-    return true;
-  }
-
- private:
-  std::vector<std::set<std::string>> keys_;  // The keys of each object that has begun and not ended.
-};
-
+/// Refuses repeated keys and deep nesting, which JSON allows.
 Json parse(const std::string& text, bool comments) {
-  StrictRules rules;
-  const auto follow = [&rules](int depth, Json::parse_event_t event, Json& parsed) {
-    return rules(depth, event, parsed);
+  using Event = Json::parse_event_t;
+  std::vector<std::set<std::string>> keys;  // Of each object that has begun and not ended.
+  const auto follow = [&keys](int depth, Event event, Json& parsed) {
+    if ((event == Event::object_start || event == Event::array_start) && depth >= nesting_limit)
+      throw SceneError(fmt::format("is nested deeper than {} levels", nesting_limit));
+    if (event == Event::object_start) keys.emplace_back();
+    if (event == Event::object_end) keys.pop_back();
+    if (event == Event::key && !keys.back().insert(parsed.get<std::string>()).second)
+      throw SceneError(
+          fmt::format("key `{}` is given twice in the same object; remove one", parsed.get<std::string>()));
+    return true;
   };
   return Json::parse(text, follow, true, comments);
 }
@@ -92,16 +76,13 @@ std::string reason(const std::string& what) {
   return closing ? text + " (is there an extra comma before it?)" : text;
 }
 
-bool is_blank(const std::string& text) {
-  return std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isspace(c); });
-}
-
 }  // namespace
 
 Json read_json_object(const std::filesystem::path& path) {
   const SceneSource source{path};
   const std::string text = read_text(source);
-  if (is_blank(text)) source.fail("is empty; a scene is a JSON object with `field` and `integrator`");
+  if (text.find_first_not_of(" \t\r\n\v\f") == std::string::npos)
+    source.fail("is empty; a scene is a JSON object with `field` and `integrator`");
   Json json;
   try {
     json = parse(text, true);

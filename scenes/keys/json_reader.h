@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/keys/json_reader.h
 /// Text → JSON. Stricter than JSON itself: an object must not have a key twice, and nesting must not be deep.
 
 #include <filesystem>

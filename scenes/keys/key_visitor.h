@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/keys/key_visitor.h
 /// Tables of keys. `describe(keys, visit)` of a struct shows each of its keys to a visitor: the reader
 /// (SectionReader) or the schema writer (SchemaWriter), which so agree.
 
@@ -78,21 +77,11 @@ class MemberOf final : public KeyMember {
   Json schema(const Limits& limits) const override { return Value<T>::schema(member_, limits); }
   Json json() const override { return Value<T>::json(member_); }
 
-  void set_word() override { set_word(member_); }
+  void set_word() override { member_ = T(); }
   bool is_word() const override { return is_word(member_); }
   void resolve(const SceneSource& source) override { resolve(source, member_); }
 
  private:
-  template <class Any>
-  static void set_word(Any& member) {
-    if constexpr (std::is_arithmetic_v<Any>) member = 0;
-  }
-  static void set_word(std::string& member) { member.clear(); }
-  template <class Any>
-  static void set_word(std::optional<Any>& member) {
-    member.reset();
-  }
-
   template <class Any>
   static bool is_word(const Any& member) {
     if constexpr (std::is_arithmetic_v<Any>) return member == Any{};
@@ -106,13 +95,9 @@ class MemberOf final : public KeyMember {
   template <class Any>
   static void resolve(const SceneSource&, Any&) {}
   static void resolve(const SceneSource& source, std::filesystem::path& path) { path = source.resolve(path); }
-  template <class Enum>
-  static void resolve(const SceneSource& source, std::variant<Enum, std::filesystem::path>& value) {
-    if (auto* path = std::get_if<std::filesystem::path>(&value)) resolve(source, *path);
-  }
-  template <class A, class B>
-  static void resolve(const SceneSource& source, std::variant<A, B, std::filesystem::path>& value) {
-    if (auto* path = std::get_if<std::filesystem::path>(&value)) resolve(source, *path);
+  template <class... Types>
+  static void resolve(const SceneSource& source, std::variant<Types...>& value) {
+    std::visit([&source](auto& each) { resolve(source, each); }, value);
   }
 
   T& member_;

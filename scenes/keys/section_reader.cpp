@@ -1,7 +1,6 @@
 #include "scenes/keys/section_reader.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <stdexcept>
 #include <utility>
 #include <variant>
@@ -32,10 +31,8 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return distance[a.size()][b.size()];
 }
 
-std::string quoted_list(const std::vector<std::string>& names, const char* separator) {
-  std::string list;
-  for (const std::string& name : names) list += fmt::format("{}`{}`", list.empty() ? "" : separator, name);
-  return list;
+std::string quoted_list(const std::vector<std::string>& names, const std::string& separator) {
+  return "`" + joined(names, ("`" + separator + "`").c_str()) + "`";
 }
 
 /// "did you mean `light`?"; if no known key is similar to `key`, what it is here, or the list of known keys.
@@ -151,8 +148,7 @@ void SectionReader::read_object(const Json& value, const std::string& key, const
 void SectionReader::only_where(std::initializer_list<const char*> keys, const char* chooser, const std::string& word,
                                const std::vector<std::string>& words) {
   if (std::find(words.begin(), words.end(), word) != words.end()) return;
-  std::string allowed;
-  for (const std::string& each : words) allowed += fmt::format("{}\"{}\"", allowed.empty() ? "" : " or ", each);
+  const std::string allowed = "\"" + joined(words, "\" or \"") + "\"";
   for (const char* key : keys)
     if (object_.contains(key)) strays_.push_back({key, chooser, word, allowed});
 }

@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/keys/section_reader.h
 /// The visitors of tables of keys: one reads an object of the scene file into a description, one writes its schema.
 
 #include <initializer_list>

@@ -1,7 +1,6 @@
 #include "scenes/keys/values.h"
 
 #include <cmath>
-#include <cstddef>
 
 #include "base/text/path_text.h"
 #include "base/text/text.h"
@@ -30,12 +29,6 @@ Json number_schema(const char* type, const Limits& limits) {
   if (std::isfinite(limits.maximum)) schema["maximum"] = static_cast<Number>(limits.maximum);
   if (limits.not_zero) schema["not"] = {{"const", 0}};
   return schema;
-}
-
-std::string quoted(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += fmt::format("{}\"{}\"", text.empty() ? "" : ", ", word);
-  return text;
 }
 
 }  // namespace
@@ -140,7 +133,9 @@ bool Value<Word>::read(const Json& json, const Limits&, Word& target) {
   return std::find(target.allowed.begin(), target.allowed.end(), target.value) != target.allowed.end();
 }
 
-std::string Value<Word>::expectation(const Word& target, const Limits&) { return "one of " + quoted(target.allowed); }
+std::string Value<Word>::expectation(const Word& target, const Limits&) {
+  return "one of \"" + joined(target.allowed, "\", \"") + "\"";
+}
 Json Value<Word>::schema(const Word& target, const Limits&) { return {{"enum", target.allowed}}; }
 Json Value<Word>::json(const Word& value) { return Value<std::string>::json(value.value); }
 

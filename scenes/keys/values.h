@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/keys/values.h
 /// How values of each type are written in a scene file: one trait for each type.
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/outputs/body_outline.h
 /// The lines by which a drawing shows bodies: their silhouette, edges at which faces turn by more than 30°, and the
 /// borders of open meshes. Faces that lie on each other, where shells touch, have no edges.
 

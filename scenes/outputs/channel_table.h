@@ -1,8 +1,6 @@
 #pragma once
-/// @file scenes/outputs/channel_table.h
 /// The channels of an EXR as a table: each row has names and values together. docs/scenes.md says what they mean.
 
-#include <cstddef>
 #include <functional>
 #include <string>
 #include <type_traits>

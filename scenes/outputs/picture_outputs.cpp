@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 
 #include <Eigen/LU>
 #include <fmt/format.h>
@@ -128,10 +127,8 @@ std::optional<double> brightest_hundredth(const Image& linear) {
   constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker.
   const std::size_t channels = linear.channels.size();
   std::vector<float> values;
-  for (std::size_t i = 0; i + 2 < linear.pixels.size(); i += channels) {
-    const float value = std::max({linear.pixels[i], linear.pixels[i + 1], linear.pixels[i + 2]});
-    values.push_back(value);
-  }
+  for (std::size_t i = 0; i + 2 < linear.pixels.size(); i += channels)
+    values.push_back(std::max({linear.pixels[i], linear.pixels[i + 1], linear.pixels[i + 2]}));
   const float brightest_value = values.empty() ? 0 : *std::max_element(values.begin(), values.end());
   if (!(brightest_value > 0)) return std::nullopt;
   const float threshold = lit * std::min(1.0f, brightest_value);

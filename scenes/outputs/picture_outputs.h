@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/outputs/picture_outputs.h
 /// The pictures that every method can write, and the header entries of all files.
 
 #include <functional>

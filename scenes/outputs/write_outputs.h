@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/outputs/write_outputs.h
 /// Render → files. Either all files are complete, or none has changed (commit_all).
 
 #include <map>

@@ -1,8 +1,6 @@
 #pragma once
-/// @file scenes/scene/kept_results.h
 /// What a method has computed of a field, kept for the next scenes of the same field.
 
-#include <cstddef>
 #include <deque>
 #include <memory>
 #include <mutex>

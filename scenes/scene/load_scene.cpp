@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include <fmt/format.h>
@@ -351,15 +350,6 @@ TriangleMesh closed_surface(TriangleMesh surface, const std::string& source) {
         source, error.what()));
   }
   return surface;
-}
-
-DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
-  DepthRange range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-  for (const Eigen::Vector3d& corner : field.corners()) {
-    range.near = std::min(range.near, (corner - origin).dot(direction));
-    range.far = std::max(range.far, (corner - origin).dot(direction));
-  }
-  return range;
 }
 
 void require_near(const Plate& plate, const char* pointer, const SceneDescription& description,

@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/scene/render.h
 /// The result of rendering a scene, ready to be written.
 
 #include <array>

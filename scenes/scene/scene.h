@@ -1,8 +1,6 @@
 #pragma once
-/// @file scenes/scene/scene.h
 /// Everything that a render needs. Immutable after loading.
 
-#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -122,14 +120,6 @@ Scene load_scene(SceneDescription description, const Progress& progress, std::op
 /// The surface of a field's body, as what cuts the volume. @param source  Names the field in errors.
 /// @throw std::runtime_error, one line that names the fix, if it is not closed.
 TriangleMesh closed_surface(TriangleMesh surface, const std::string& source);
-
-/// Where the volume begins and ends along a direction, as signed distances from an origin, world units.
-struct DepthRange {
-  double near = 0, far = 0;
-};
-
-/// @param direction  Unit.
-DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
 
 /// @param pointer  JSON pointer of the rectangle in the scene file.
 /// @throw SceneError if the rectangle is too large, or too far from the volume, for single precision.

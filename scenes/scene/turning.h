@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/scene/turning.h
 /// Scenes in which y is up: all that their files hold is turned when it is read, so that z is up while the program
 /// computes, and turned back when it is written. (The reader turns the vectors of the scene itself.)
 

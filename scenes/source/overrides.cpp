@@ -1,7 +1,6 @@
 #include "scenes/source/overrides.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <stdexcept>
 #include <unordered_set>
 

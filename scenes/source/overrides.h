@@ -1,5 +1,4 @@
 #pragma once
-/// @file scenes/source/overrides.h
 /// Changes to a scene before it is read: keys by their names, as "light.photons", from the command line; keyframes, and
 /// numbers in file names, from frame to frame.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/base/rank_support.h
 /// Ranks that are threads.
 
 #include <condition_variable>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/fuzz/targets.h
 /// The parsers that are ours, each as a function of any bytes. A fuzzer looks for bytes that break them (fuzzer.cpp);
 /// the bytes that broke them once, and some that are right, are in `corpus/NAME/`, and are a test (replay_test.cpp).
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/fuzz/view_targets.h
 /// What the live view is sent, as functions of any bytes: see targets.h.
 
 #include <string>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/images/picture_files.h
 /// Picture files made byte by byte, for features that readers must support but that write_image does not use.
 
 #include <array>

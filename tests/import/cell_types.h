@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/import/cell_types.h
 /// A cell of each three-dimensional type that VTK has, with a known volume.
 
 #include <vtkCell.h>

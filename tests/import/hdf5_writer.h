@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/import/hdf5_writer.h
 /// Writes HDF5 files for the tests of readers.
 
 #include <vtk_hdf5.h>

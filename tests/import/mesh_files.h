@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/import/mesh_files.h
 /// Temporary files, the data sets, and reading and writing of bytes, for the tests of mesh readers.
 
 #include <stdexcept>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/import/mesh_fixtures.h
 /// Meshes of a few cells with known shapes and values.
 
 #include <functional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/import/openfoam_case.h
 /// An OpenFOAM case as blockMesh and a solver would write it, in ASCII: 2 x 2 x 2 hexahedra of 1 x 0.5 x 2.
 
 #include <array>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/import/velocity_meshes.h
 /// Meshes with a velocity U at cells, and what is imported of its gradient.
 
 #include <functional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/import/voxel_support.h
 /// Temporary files of voxels, the data sets, and checks of the results.
 
 #include <cstring>

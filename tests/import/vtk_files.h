@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/import/vtk_files.h
 /// Small data sets of every kind with a point array "tensor" and a cell array "rate", and files that contain them.
 
 #include <optional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/program/divided_scenes.h
 /// Small scenes of all methods, of the field in field.vdb.
 
 #include <string>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/program/import_support.h
 /// Imports files as a user does, and writes files to import. Their field consists of lumps without any symmetry.
 
 #include <array>

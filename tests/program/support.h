@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/program/support.h
 /// Runs the whole program, as a user does.
 
 #include <chrono>

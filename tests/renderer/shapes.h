@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/renderer/shapes.h
 /// Surfaces, and what is known of them in closed form.
 
 #include <utility>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/renderer/statistics.h
 /// Hypothesis tests, and means with standard errors.
 
 #include <cstddef>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/renderer/support.h
 /// Bytes of files and the headers of .ply files, for the tests of the renderer and of pictures.
 
 #include "tests/files.h"

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/scenes/read_scene_fixture.h
 /// Scene files in a folder of their own, and the errors that they give.
 
 #include <fstream>

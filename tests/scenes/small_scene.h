@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/scenes/small_scene.h
 
 #include <string>
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/structure/sources.h
 /// The files of the project, and its sources as lines of text, for tests of rules about them.
 
 #include <fstream>

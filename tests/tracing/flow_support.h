@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/tracing/flow_support.h
 /// Flow maps of fields in a cube, and their light.
 
 #include <numeric>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/tracing/packet_support.h
 /// Random fields and rays, and functions that compare packets with the reference.
 
 #include <cstdint>

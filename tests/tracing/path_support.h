@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/tracing/path_support.h
 /// Paths that files must keep, and comparisons of paths.
 
 #include <random>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/tracing/support.h
 /// Small fields and scenes for the tests of the integrators.
 
 #include <functional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/viewer/view_support.h
 /// A small scene in a folder of its own, and messages of pages.
 
 #include <condition_variable>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/volumes/file_support.h
 /// Temporary files, a tensor grid with everything that files must keep, and grids that OpenVDB itself writes.
 
 #include <openvdb/openvdb.h>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/volumes/grid_support.h
 /// Grids of tensors, and what is in them.
 
 #include "tests/names.h"

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/volumes/level_support.h
 /// Grids of several levels.
 
 #include <functional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/volumes/point_support.h
 /// Points that files must keep, for the tests of their formats.
 
 #include <random>

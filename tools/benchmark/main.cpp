@@ -1,4 +1,3 @@
-/// @file tools/benchmark/main.cpp
 /// `tensorray_bench`: Google Benchmark with the ratios within each case, and the name of the processor.
 
 #include <fstream>

@@ -1,4 +1,3 @@
-/// @file tools/benchmark/polariscope.cpp
 /// Rows of a picture of 1024² pixels through 65³ voxels, on one thread: what the field's samples alone take, and the
 /// light of 32 bands.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/benchmark/questions.h
 /// The questions that `tensorray_bench` answers. A benchmark is named QUESTION/CASE/WAY. The ways of one case are
 /// compared: main.cpp prints how many times faster each is than the first.
 

@@ -1,4 +1,3 @@
-/// @file tools/benchmark/rays.cpp
 /// Rays a second of one thread: a loop that a user of OpenVDB's BoxSampler would write, and `trace`, which
 /// has cubic fields and steps of order four, also with the same voxels as a second level.
 

@@ -1,4 +1,3 @@
-/// @file tools/benchmark/view.cpp
 /// Seconds from a page's message with a changed scale, or a turned analyser, to a picture's bytes, without the network:
 /// the first, coarse picture and the finished one, with its phases.
 

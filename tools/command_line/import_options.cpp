@@ -1,7 +1,6 @@
 #include "tools/command_line/import_options.h"
 
 #include <cmath>
-#include <stdexcept>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/command_line/import_options.h
 /// The options of `tensorray import` that all commands have which take other programs' files.
 
 #include <map>

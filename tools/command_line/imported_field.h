@@ -1,8 +1,6 @@
 #pragma once
-/// @file tools/command_line/imported_field.h
 /// Takes other programs' files without a separate import.
 
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <vector>

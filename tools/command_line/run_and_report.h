@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/command_line/run_and_report.h
 /// How the programs end: errors as one line and an exit status, and signals.
 
 #include <exception>

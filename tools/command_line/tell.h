@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/command_line/tell.h
 /// Prints what the programs say about their work. What cannot be written (the log's disk is full, its reader has gone)
 /// is dropped: no message is worth the work that it is about. What a command was asked for, such as `info`, is printed
 /// with fmt::print instead, and is an error where it cannot be written (run_and_report.h).

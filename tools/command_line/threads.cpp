@@ -1,7 +1,6 @@
 #include "tools/command_line/threads.h"
 
 #include <algorithm>
-#include <cstddef>
 
 #include <tbb/task_arena.h>
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/command_line/threads.h
 /// The threads of a command.
 
 #include <tbb/global_control.h>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/command_line/vdb_output.h
 /// Checks on the command line that other programs will recognize an output as an OpenVDB file.
 
 #include <filesystem>

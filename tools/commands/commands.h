@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/commands/commands.h
 /// The subcommands of the program, one per file. Each function adds a subcommand to `program`, which does its work
 /// while the command line is parsed. Errors are exceptions: CLI::Error, SceneError and std::invalid_argument where
 /// the user's input is wrong.

@@ -1,11 +1,9 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
-#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -1,10 +1,8 @@
 #pragma once
-/// @file tools/import/import_file.h
 /// Reads tensors from files of other programs: finds the format and calls its reader. Two ways lead to a TensorGrid.
 /// The voxels of a Lattice are kept. A mesh is a VTK data set whose cells are checked (vtk_data_sets.h): it gets
 /// tensors at its points or cells (mesh_tensors.h), and is sampled at voxels (mesh_sampling.h).
 
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>

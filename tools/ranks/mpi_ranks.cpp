@@ -1,4 +1,3 @@
-/// @file tools/ranks/mpi_ranks.cpp
 /// Ranks by MPI: the only code that uses it. It is a library of its own (ranks.cpp loads it).
 
 #include <algorithm>

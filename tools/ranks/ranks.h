@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/ranks/ranks.h
 /// The processes that `mpirun` started together, as Ranks.
 
 #include <memory>

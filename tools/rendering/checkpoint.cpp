@@ -16,7 +16,6 @@
 #include "base/text/text.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
-#include "tools/rendering/render_scene.h"
 
 namespace tensorray {
 namespace {

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/rendering/checkpoint.h
 /// Checkpoints of a render: written while it runs, and read by the one that continues it.
 
 #include <condition_variable>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/rendering/rank_scene.h
 /// How ranks (`mpirun -n 4 tensorray render`) get the scene that the root has read, and what they do with it.
 
 #include "tools/rendering/render_scene.h"

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "base/errors.h"
-#include "base/files/output_file.h"
 #include "base/process/seconds.h"
 #include "base/text/path_text.h"
 #include "base/text/text.h"

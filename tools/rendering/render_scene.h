@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/rendering/render_scene.h
 /// Renders a scene file and writes its outputs. Its drivers: frames.cpp renders sequences, checkpoint.h keeps the
 /// work and continues it, rank_scene.h gives the scene to other ranks.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/viewer/answers.h
 /// What a page can ask about a scene and its picture. All functions return messages of the page's protocol
 /// (tools/viewer/page/src/state/protocol.ts), without `type` and `id`.
 

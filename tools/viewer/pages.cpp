@@ -1,7 +1,6 @@
 #include "tools/viewer/pages.h"
 
 #include <algorithm>
-#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>

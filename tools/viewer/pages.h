@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/viewer/pages.h
 /// The pages that look at a scene, and the one thread that renders for them.
 
 #include <condition_variable>

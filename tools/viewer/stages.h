@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/viewer/stages.h
 /// What a page may ask for, the pictures that it gets of one scene, coarse ones first, and what stays valid of them.
 
 #include <deque>

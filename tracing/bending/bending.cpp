@@ -1,7 +1,6 @@
 #include "tracing/bending/bending.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace tensorray {
 namespace {

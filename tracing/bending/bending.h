@@ -1,12 +1,10 @@
 #pragma once
-/// @file tracing/bending/bending.h
 /// Rays: settings of how they are followed, their records and their ends. In a tensor field light bends by (Zheng and
 /// Pang 2003, Eq. 5)
 ///   P' = V,  V' = σ (T V − (VᵀTV) V),  |V| = 1, with σ = s · scale.
 /// Only bending_steps.h and, for packets, packet_step-inl.h contain this rule.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/bending/geometry.h
 /// Finds where light meets the surfaces of a scene: bounds, cut, plate and obstacles.
 
 #include <array>

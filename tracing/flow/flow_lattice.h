@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/flow/flow_lattice.h
 /// The lattice on which the quads of a flow map lie, and the triangles that they become. Coordinates on it are
 /// integers, so that neighbours are found by hashing.
 

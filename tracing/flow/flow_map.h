@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/flow/flow_map.h
 /// The flow map of a beam: where light from each point of the beam's aperture lands on a plate, for a range of
 /// flexibilities. It is a mesh of rays, finer where the map bends, folds or tears.
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <vector>
 
 #include "tracing/trace/trace.h"
@@ -13,8 +12,7 @@ bool RayMemory::serves(const TensorField& field, const Geometry& geometry, const
                        const BendingSettings& settings) {
   const Surfaces& surfaces = geometry.surfaces();
   if (!surfaces.plate || !surfaces.obstacles.empty() || std::isfinite(settings.max_length)) return false;
-  double far = -Geometry::infinite;
-  for (const Eigen::Vector3d& corner : field.corners()) far = std::max(far, corner.dot(direction));
+  const double far = depth_range(field, Eigen::Vector3d::Zero(), direction).far;
   const auto corners = surfaces.plate->corners();
   return std::all_of(corners.begin(), corners.end(), [&](const auto& corner) { return corner.dot(direction) > far; });
 }

@@ -1,9 +1,7 @@
 #pragma once
-/// @file tracing/flow/ray_memory.h
 /// Keeps the rays of a flow map, for other maps of the same light to other plates.
 
 #include <array>
-#include <cstddef>
 
 #include <Eigen/Core>
 #include <tbb/concurrent_unordered_map.h>

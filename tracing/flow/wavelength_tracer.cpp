@@ -1,7 +1,6 @@
 #include "tracing/flow/wavelength_tracer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <utility>
 

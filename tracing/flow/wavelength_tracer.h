@@ -1,10 +1,8 @@
 #pragma once
-/// @file tracing/flow/wavelength_tracer.h
 /// Landings of light of one vertex at all its wavelength samples: some are traced, the others predicted.
 
 #include <array>
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>

@@ -1,10 +1,8 @@
 #pragma once
-/// @file tracing/flow_drawing/caustic.h
 /// The light of a flow map on the pixels of its plate: each triangle's light is spread evenly over the triangle between
 /// its landings, and each pixel gets the exact area that it shares with it.
 
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/flow_drawing/flow_irradiance.h
 /// The irradiance that the disk of a distant light, or a point light, gives a surface through the field, band by band.
 
 #include <cstdint>

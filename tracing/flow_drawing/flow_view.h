@@ -1,8 +1,6 @@
 #pragma once
-/// @file tracing/flow_drawing/flow_view.h
 /// Reads a flow map at the points of a picture: which light starts, or lands, there.
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

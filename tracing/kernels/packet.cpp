@@ -1,6 +1,5 @@
 #include "tracing/kernels/packet.h"
 
-#include <algorithm>
 #include <cmath>
 #include <optional>
 

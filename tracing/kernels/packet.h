@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/kernels/packet.h
 /// What the kernel's code for all instruction sets shares: the field, a packet of rays, and what only few rays need,
 /// which is computed one by one in double precision.
 

@@ -1,4 +1,3 @@
-/// @file tracing/kernels/packet_bricks-inl.h
 /// The bricks of a packet's lanes, and their sample points in these bricks.
 
 /// The leaf of a lane, at any of its points. It is not compared with that of the lane before: where rays part, this

@@ -1,11 +1,9 @@
 #include "tracing/kernels/packet_kernel.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <stdexcept>
-#include <type_traits>
 
 #include "tracing/kernels/packet.h"
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/kernels/packet_kernel.h
 /// Traces many rays at once inside a cubic field, by `splitting4`: the default. (The same code has `splitting` with
 /// steps of a given length, which the search of the automatic scale uses.) Steps are those of scalar_tracer.h, in
 /// single precision and in the widest vectors of the processor. docs/dev/performance_notes.md explains the method. The

@@ -1,4 +1,3 @@
-/// @file tracing/kernels/packet_landing-inl.h
 /// The last step of rays in the extent, which ends on a face of the extent or on a surface, and the path within a step.
 
 /// The last step of rays: the length of the whole step, which is too long, its chord, and the axis of the face where

@@ -1,4 +1,3 @@
-/// @file tracing/kernels/packet_splines-inl.h
 /// The tensor at the sample points of a packet: sums of 4³ coefficients of cubic B-splines.
 
 /// Weights of the four coefficients about each lane along each axis, and their derivatives.

@@ -1,4 +1,3 @@
-/// @file tracing/kernels/packet_step-inl.h
 /// A step of a packet: its length, its drifts and kicks (`splitting4`, methods.h), and its error. It leads from `now`
 /// to `next`.
 

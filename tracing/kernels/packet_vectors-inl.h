@@ -1,4 +1,3 @@
-/// @file tracing/kernels/packet_vectors-inl.h
 /// Vectors with a ray in each lane: arithmetic, and the order of numbers in them.
 
 namespace hn = hwy::HWY_NAMESPACE;

@@ -1,7 +1,6 @@
 #include "tracing/paths/cross_section.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include <Eigen/Eigenvalues>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/paths/cross_section.h
 /// Ellipses of the tensor along a path (Zheng and Pang 2003, Eq. 8), and frames that join them.
 
 #include <vector>

@@ -1,9 +1,7 @@
 #pragma once
-/// @file tracing/paths/path_thinning.h
 /// Joins the two parts of a path, and chooses the points that are needed: samples all of them in single precision,
 /// component after component, and compares them in the vectors of the processor.
 
-#include <cstddef>
 #include <vector>
 
 #include "tracing/bending/bending.h"

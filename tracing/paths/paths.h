@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/paths/paths.h
 /// Bent rays as polylines with the field's tensor along them (Zheng and Pang 2003, the first of the paper's three
 /// methods).
 

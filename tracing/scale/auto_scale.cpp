@@ -11,7 +11,6 @@
 namespace tensorray {
 namespace {
 
-using Eigen::Matrix2d;
 using Eigen::Vector3d;
 
 constexpr double wanted_part = 0.85;   // Of the greatest AutoScale::shown.
@@ -46,11 +45,7 @@ ProbeBeam probe_beam(const TensorField& field, const Beam& beam) {
   Emission emission;
   for (std::uint64_t i = 0; i < sampler.candidates(); ++i)
     if (sampler.sample(i, emission)) probes.origins.push_back(emission.origin);
-  double near = Geometry::infinite, far = -near;
-  for (const Vector3d& corner : field.corners()) {
-    near = std::min(near, corner.dot(beam.direction));
-    far = std::max(far, corner.dot(beam.direction));
-  }
+  const auto [near, far] = depth_range(field, Vector3d::Zero(), beam.direction);
   probes.plane = far + plane_distance * (far - near);
   return probes;
 }
@@ -65,7 +60,7 @@ double log_area(const ProbeBeam& probes, const RayBatch& batch, std::size_t i) {
   const double ahead = (probes.plane - batch.position[i].dot(beam.direction)) / slope;
   const Eigen::Matrix<double, 3, 2> moved = d.position + ahead * d.direction;
   const Eigen::Matrix<double, 3, 2> landed = moved - V * (beam.direction.transpose() * moved) / slope;
-  Matrix2d jacobian;
+  Eigen::Matrix2d jacobian;
   jacobian << beam.right.transpose() * landed, beam.up.transpose() * landed;
   const double area = std::abs(jacobian.determinant());
   return std::isfinite(area) ? std::log(std::max(area, 1e-300)) : 0;

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/scale/auto_scale.h
 /// Chooses a field's scale (BendingSettings::scale), and the direction of the light, so that the light shows the field.
 ///
 /// Parallel light at s = 0.2 lands on a plane across it, a quarter of the volume's depth behind the volume. What one

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/steps/bending_steps.h
 /// One step along a bent ray by each of the methods, in double precision.
 
 #include <array>

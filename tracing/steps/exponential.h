@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/steps/exponential.h
 /// The action of a matrix exponential on a direction.
 
 #include <array>

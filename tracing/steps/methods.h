@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/steps/methods.h
 /// Coefficients of the methods, the lengths of their steps, and the path between the ends of a step, for both tracers.
 
 #include <cmath>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/steps/scalar_tracer.h
 /// Traces one ray at a time in double precision, by any method and in any field. This is the reference for the packets
 /// of packet_kernel.h, and it does what packets leave to it. A step is taken in `Tracer::bend`.
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tracing/trace/trace.h
 /// Follows rays through a tensor field.
 
 #include <vector>

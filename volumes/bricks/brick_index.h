@@ -1,9 +1,7 @@
 #pragma once
-/// @file volumes/bricks/brick_index.h
 /// Finds the brick that is at a given place.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/bricks/brick_layout.h
 /// How bricks, and the blocks that they are made of, hold coefficients: all that sampling needs to know of a layout.
 
 namespace tensorray {

@@ -1,8 +1,6 @@
 #pragma once
-/// @file volumes/bricks/brick_memory.h
 /// Memory for the bricks of a field, and for the blocks that they are made of.
 
-#include <cstddef>
 #include <memory>
 
 #include "base/files/descriptor.h"

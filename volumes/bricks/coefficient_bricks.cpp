@@ -1,6 +1,5 @@
 #include "volumes/bricks/coefficient_bricks.h"
 
-#include <algorithm>
 #include <map>
 #include <tuple>
 

@@ -1,11 +1,9 @@
 #pragma once
-/// @file volumes/bricks/coefficient_bricks.h
 /// The bricks of a field while it is made: which voxels have coefficients, and where these are in memory. The
 /// coefficients of a linear field are its values.
 
 #include <algorithm>
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstddef>
-#include <cstdint>
 #include <cstring>
 
 #include <tbb/parallel_for.h>
@@ -11,7 +9,6 @@
 namespace tensorray {
 namespace {
 
-using Eigen::AlignedBox3i;
 using Eigen::Vector3i;
 
 constexpr int edge = TensorBlock::size;
@@ -74,7 +71,7 @@ struct Column {
 /// whether it may have one.
 struct Runs {
   int axis, begin, count;  // Index of the first voxel along the axis, and number of voxels.
-  const AlignedBox3i& extent;
+  const Eigen::AlignedBox3i& extent;
   Border border;
 
   /// Calls solve(from, length, continues_before, continues_after) for each run.

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/bricks/coefficients.h
 /// From the voxels of a field to the coefficients that its cells need.
 
 #include <cstdint>

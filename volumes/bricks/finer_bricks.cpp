@@ -1,7 +1,6 @@
 #include "volumes/bricks/finer_bricks.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdint>
 
 #include <tbb/parallel_for.h>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/bricks/finer_bricks.h
 /// The finer levels of a field, as a hierarchical B-spline (D. Forsey and R. Bartels, Hierarchical B-spline refinement,
 /// 1988). A spline on voxels of size h is one on voxels of size h / 2, whose coefficients follow from
 /// B(x) = Σ m[k] B(2x − k), m = (1 4 6 4 1) / 8. A level adds details to it: coefficients of B-splines that are zero

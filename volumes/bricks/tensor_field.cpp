@@ -4,7 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
-#include <optional>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -301,6 +301,15 @@ Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
 std::size_t TensorField::memory_bytes() const {
   return brick_count() * (memory_.stride * sizeof(float) + sizeof(Eigen::Vector3i)) + index_.memory_bytes() +
          families_.size() * sizeof(Family) + family_of_.size() * sizeof(family_of_[0]);
+}
+
+DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
+  DepthRange range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  for (const Eigen::Vector3d& corner : field.corners()) {
+    range.near = std::min(range.near, (corner - origin).dot(direction));
+    range.far = std::max(range.far, (corner - origin).dot(direction));
+  }
+  return range;
 }
 
 }  // namespace tensorray

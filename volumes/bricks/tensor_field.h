@@ -1,9 +1,7 @@
 #pragma once
-/// @file volumes/bricks/tensor_field.h
 /// A tensor field that light can be traced through: immutable bricks in memory, and what is between their voxels.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -207,5 +205,13 @@ class TensorField {
   std::vector<Family> families_;
   std::vector<std::uint32_t> family_of_;  ///< By the number of a brick in memory; BrickIndex::missing: not refined.
 };
+
+/// Where the volume begins and ends along a direction, as signed distances from an origin, world units.
+struct DepthRange {
+  double near = 0, far = 0;
+};
+
+/// @param direction  Unit.
+DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
 
 }  // namespace tensorray

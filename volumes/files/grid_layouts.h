@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/files/grid_layouts.h
 /// Which grids of an OpenVDB file are a field, by their names and types. Does not include OpenVDB.
 
 #include <array>

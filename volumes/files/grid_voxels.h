@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/files/grid_voxels.h
 /// The voxels of a grid of an OpenVDB file, block by block. Values of leaves are read from the file when a block needs
 /// them; those of tiles are in memory.
 /// Only .cpp files of this folder include this header: it includes all of OpenVDB.

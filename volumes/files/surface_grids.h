@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/files/surface_grids.h
 /// The surface of a body, as two grids of a field's file: NAME_surface_points, in index space of the field, so that who
 /// moves the field moves it, too, and NAME_surface_triangles, the numbers of their points. They are Vec3 grids of
 /// single precision, which all programs read. Their voxels, block by block, z fastest, are a list: two of them are a

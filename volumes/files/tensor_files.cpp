@@ -1,8 +1,6 @@
 #include "volumes/files/tensor_files.h"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <functional>
 #include <memory>
 #include <set>

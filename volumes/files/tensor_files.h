@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/files/tensor_files.h
 /// Tensor fields, and grids of numbers, in OpenVDB files. Only the .cpp file includes OpenVDB.
 
 #include <filesystem>

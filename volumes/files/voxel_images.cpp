@@ -1,7 +1,6 @@
 #include "volumes/files/voxel_images.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>

@@ -1,8 +1,6 @@
 #pragma once
-/// @file volumes/files/voxel_images.h
 /// Numbers at the voxels of a box, as files that programs of medical images and ParaView show.
 
-#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -1,7 +1,6 @@
 #include "volumes/grids/block_source.h"
 
 #include <array>
-#include <map>
 #include <memory>
 #include <utility>
 

@@ -1,8 +1,6 @@
 #pragma once
-/// @file volumes/grids/block_source.h
 /// Tensors block by block: those of a file, a generator, an array or a grid. This is what fields are made of.
 
-#include <cstddef>
 #include <functional>
 #include <map>
 #include <string>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/grids/mirror.h
 /// Fields of which a half is stored: their mirror image is the other.
 
 #include "volumes/grids/block_source.h"

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <new>
 #include <stdexcept>
-#include <string>
 #include <system_error>
 #include <utility>
 

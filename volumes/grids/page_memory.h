@@ -1,10 +1,8 @@
 #pragma once
-/// @file volumes/grids/page_memory.h
 /// Memory of fields, and of the voxels that they are made of, in whole pages. With `--memory` the pages are those of
 /// files: the system's page cache holds as many of them as there is room for, takes them away when memory is needed,
 /// and brings them back when they are used. Code that uses them does not notice.
 
-#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <mutex>

@@ -1,6 +1,5 @@
 #include "volumes/grids/tensor_grid.h"
 
-#include <algorithm>
 #include <atomic>
 #include <cmath>
 
@@ -90,11 +89,6 @@ std::size_t remove_non_finite(TensorBlock& block) {
     block.active.reset(offset);
   }
   return before - block.active.count();
-}
-
-void remove_empty_blocks(TensorBlocks& blocks) {
-  const auto is_empty = [](const TensorBlock& block) { return block.active.none(); };
-  blocks.erase(std::remove_if(blocks.begin(), blocks.end(), is_empty), blocks.end());
 }
 
 void remove_empty_blocks(TensorGrid& grid) {

@@ -1,11 +1,10 @@
 #pragma once
-/// @file volumes/grids/tensor_grid.h
 /// Tensors, or numbers, at the voxels of a sparse grid. Files hold them, generators make them, and preprocessing
 /// changes them. Tracing needs a TensorField, which is built from it.
 
+#include <algorithm>
 #include <array>
 #include <bitset>
-#include <cstddef>
 #include <deque>
 #include <functional>
 #include <map>
@@ -107,8 +106,12 @@ struct ScalarGrid {
 TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
                       const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value);
 
-/// Removes blocks that have no active voxel, of all levels.
-void remove_empty_blocks(TensorBlocks& blocks);
+/// Removes blocks that have no active voxel: of a level, or of a ScalarGrid; of all levels.
+template <class Blocks>
+void remove_empty_blocks(Blocks& blocks) {
+  const auto is_empty = [](const auto& block) { return block.active.none(); };
+  blocks.erase(std::remove_if(blocks.begin(), blocks.end(), is_empty), blocks.end());
+}
 void remove_empty_blocks(TensorGrid& grid);
 
 /// Sets voxels that are not finite to zero and inactive, so that light goes straight there, and removes blocks that

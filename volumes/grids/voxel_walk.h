@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/grids/voxel_walk.h
 /// The voxels that a segment crosses, one after the other (J. Amanatides and A. Woo, A fast voxel traversal algorithm
 /// for ray tracing, Eurographics 1987).
 

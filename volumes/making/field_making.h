@@ -1,9 +1,7 @@
 #pragma once
-/// @file volumes/making/field_making.h
 /// Makes a field of blocks in one pass: each block is read, cleaned, preprocessed and placed in its bricks while it is
 /// in the processor's caches, without a grid in between.
 
-#include <cstddef>
 #include <optional>
 #include <vector>
 

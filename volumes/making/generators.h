@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/making/generators.h
 /// Analytic tensor fields, sampled on a grid.
 
 #include <string>

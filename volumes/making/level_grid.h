@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/making/level_grid.h
 /// A level of a grid of several levels, as a grid of its own.
 
 #include "volumes/grids/tensor_grid.h"

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/making/noise.h
 /// What of a measured field is noise: the field without its structure, for a picture beside that of the field.
 
 #include "volumes/grids/tensor_grid.h"

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/making/smoothing.h
 /// Normalised convolution of a field with a Gaussian, for measurements with noise, such as diffusion tensors.
 
 #include "volumes/grids/tensor_grid.h"

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/points/point_files.h
 /// Points with attributes, as OpenVDB points or VTK polydata.
 
 #include <filesystem>

@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <numeric>
 #include <stdexcept>
-#include <string>
 #include <system_error>
 
 #include <fcntl.h>

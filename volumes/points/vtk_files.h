@@ -1,10 +1,8 @@
 #pragma once
-/// @file volumes/points/vtk_files.h
 /// Points and polylines as VTK polydata (.vtp). Reading starts another program, `tensorray-import`, which contains VTK.
 /// Rendering therefore needs no VTK, and where VTK prints or ends the process because a file is damaged, the caller
 /// gets an exception.
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>

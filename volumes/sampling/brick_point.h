@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/sampling/brick_point.h
 /// A point relative to a brick, so that single precision resolves 1e-6 of a voxel in a field of any size.
 
 #include <algorithm>

@@ -1,9 +1,7 @@
 #include "volumes/sampling/tensor_sampler.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 
 #include "volumes/bricks/brick_layout.h"

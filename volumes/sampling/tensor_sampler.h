@@ -1,9 +1,7 @@
 #pragma once
-/// @file volumes/sampling/tensor_sampler.h
 /// The tensor at a point, in double precision; and at many points, in single precision, side by side.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <utility>
 

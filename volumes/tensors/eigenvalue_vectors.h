@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/tensors/eigenvalue_vectors.h
 /// with_eigenvalues of eigenvalues.h for many tensors at once, in the widest vectors of the processor.
 
 namespace tensorray {

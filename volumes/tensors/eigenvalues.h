@@ -1,9 +1,7 @@
 #pragma once
-/// @file volumes/tensors/eigenvalues.h
 /// Preprocessing of tensors by their eigenvalues (Zheng and Pang 2003, Eq. 7), and the eigenvalues themselves.
 
 #include <complex>
-#include <cstddef>
 #include <string>
 
 #include <Eigen/Core>

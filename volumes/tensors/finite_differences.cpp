@@ -1,7 +1,6 @@
 #include "volumes/tensors/finite_differences.h"
 
 #include <algorithm>
-#include <array>
 #include <tuple>
 
 #include <tbb/parallel_for.h>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/tensors/finite_differences.h
 /// Tensors derived from vectors or scalars at the voxels of a sparse grid.
 
 #include <array>

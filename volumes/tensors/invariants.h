@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/tensors/invariants.h
 /// Numbers that describe a tensor and do not depend on the axes.
 
 #include <string>

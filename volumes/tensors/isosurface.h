@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/tensors/isosurface.h
 /// Surfaces on which an invariant of a tensor field has one value.
 
 #include <vector>

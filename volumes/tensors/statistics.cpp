@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>

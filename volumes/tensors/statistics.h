@@ -1,9 +1,7 @@
 #pragma once
-/// @file volumes/tensors/statistics.h
 /// The numbers that `tensorray info` prints about a field.
 
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Geometry>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/vdb/vdb_archive.h
 /// Reads and writes OpenVDB files, and reports damage and full disks. OpenVDB's own io::File does neither: it does
 /// not check the state of its stream, so that it reads uncompressed files cut short as if they were whole, and it
 /// trusts the lengths in damaged trees, which may end the process. vdb_tree_check.h checks the lengths first.

@@ -1,5 +1,4 @@
 #pragma once
-/// @file volumes/vdb/vdb_tree_check.h
 /// Checks that the lengths in a stored OpenVDB tree fit the tree and the file. OpenVDB does not check them: it
 /// allocates memory for the values that a chunk should have, and then writes as many bytes as the chunk claims to
 /// have.

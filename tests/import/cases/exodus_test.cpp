@@ -1,7 +1,5 @@
 // ExodusII files whose writer was stopped, or which announce what they do not hold; and pieces of Nemesis.
 
-#include "tools/import/cases/exodus.h"
-
 #include <array>
 #include <functional>
 #include <limits>
@@ -14,6 +12,7 @@
 #include "base/text/byte_order.h"
 #include "tests/import/mesh_files.h"
 #include "tests/import/mesh_fixtures.h"
+#include "tools/import/cases/case_files.h"
 #include "tools/import/import_file.h"
 #include "tools/import/vtk_source/vtk_source.h"
 

@@ -1,5 +1,3 @@
-#include "tools/import/cases/plot3d.h"
-
 #include <cstdint>
 
 #include <vtkDataArray.h>
@@ -7,6 +5,7 @@
 #include <vtkStructuredGrid.h>
 
 #include "tests/import/mesh_files.h"
+#include "tools/import/cases/case_files.h"
 
 namespace tensorray {
 namespace {

@@ -17,7 +17,6 @@
 #include "tests/import/vtk_files.h"
 #include "tools/import/import_file.h"
 #include "tools/import/meshes/flat_mesh.h"
-#include "tools/import/surfaces/mesh_boundary.h"
 #include "tools/import/surfaces/triangle_shells.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 

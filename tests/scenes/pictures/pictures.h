@@ -1,5 +1,4 @@
 #pragma once
-/// @file tests/scenes/pictures/pictures.h
 /// Renders small scenes as `tensorray render` does, in the process of the test.
 
 #include <fstream>

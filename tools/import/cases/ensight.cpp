@@ -1,7 +1,4 @@
-#include "tools/import/cases/ensight.h"
-
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
@@ -22,7 +19,7 @@
 #include "base/errors.h"
 #include "base/files/temporary_folder.h"
 #include "base/text/text.h"
-#include "tools/import/vtk/vtk_data_sets.h"
+#include "tools/import/cases/case_files.h"
 #include "tools/import/vtk_formats/array_names.h"
 
 namespace tensorray {

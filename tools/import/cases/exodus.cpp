@@ -1,5 +1,3 @@
-#include "tools/import/cases/exodus.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,6 +21,7 @@
 
 #include "base/errors.h"
 #include "base/text/text.h"
+#include "tools/import/cases/case_files.h"
 
 namespace tensorray {
 namespace {

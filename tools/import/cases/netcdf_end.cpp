@@ -9,7 +9,7 @@
 
 #include "base/errors.h"
 #include "base/text/byte_order.h"
-#include "tools/import/cases/exodus.h"
+#include "tools/import/cases/case_files.h"
 
 namespace tensorray {
 namespace {

@@ -1,11 +1,13 @@
 #pragma once
-/// @file tools/import/cases/openfoam.h
-/// The folders of an OpenFOAM case, regions and the parts that processors wrote, and the order of its tensors.
+/// The folders of an OpenFOAM case, regions and the parts that processors wrote, the order of its tensors, and what the
+/// boundaryField of its fields prescribes for vectors at patches.
 
-#include <cstddef>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
+
+#include "tools/import/meshes/cell_graph.h"
 
 class vtkDataSet;
 
@@ -51,5 +53,14 @@ std::vector<std::string> words_after(const std::string& text, const std::string&
 /// are left alone.
 /// @param time  The folder of the time that was read.
 void correct_uniform_tensors(vtkDataSet& data, const std::filesystem::path& time);
+
+/// By the names of fields.
+using OpenFoamWalls = std::map<std::string, std::vector<Wall>>;
+
+/// Adds the walls of all fields of class volVectorField: `noSlip` and types with a `value` are values, `zeroGradient`
+/// is no gradient, `symmetry`, `symmetryPlane` and `slip` are slip. At patches of other types (`empty`, `wedge`,
+/// `cyclic`, `processor`, ...) and at those that the file does not name nothing is prescribed.
+/// @param folder  A case, with the folder of `time` in it. @throw as VTK's reader, through VtkMessages.
+void add_openfoam_walls(const std::filesystem::path& folder, const OpenFoamTime& time, OpenFoamWalls& walls);
 
 }  // namespace tensorray

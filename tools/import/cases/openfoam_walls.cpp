@@ -1,9 +1,6 @@
-#include "tools/import/cases/openfoam_walls.h"
-
 #include <algorithm>
 #include <optional>
 #include <regex>
-#include <utility>
 
 #include <vtkCell.h>
 #include <vtkCellData.h>
@@ -15,6 +12,8 @@
 #include <vtkOpenFOAMReader.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+
+#include "tools/import/cases/openfoam.h"
 
 namespace tensorray {
 namespace {

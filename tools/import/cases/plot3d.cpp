@@ -1,5 +1,3 @@
-#include "tools/import/cases/plot3d.h"
-
 #include <limits>
 #include <string>
 
@@ -13,6 +11,7 @@
 #include <vtkStructuredGrid.h>
 
 #include "base/errors.h"
+#include "tools/import/cases/case_files.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk/vtk_messages.h"
 

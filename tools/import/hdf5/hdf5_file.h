@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/hdf5/hdf5_file.h
 /// Reads datasets of HDF5 files as VTK's arrays. Only the .cpp file includes HDF5.
 
 #include <cstdint>

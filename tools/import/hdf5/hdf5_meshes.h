@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/hdf5/hdf5_meshes.h
 /// Meshes whose numbers are in HDF5 files. Of them Debian 12's VTK reads VTKHDF of version 1 alone, without steps.
 
 #include "tools/import/vtk/vtk_data_sets.h"

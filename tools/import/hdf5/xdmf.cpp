@@ -27,7 +27,6 @@
 namespace tensorray {
 namespace {
 
-using Path = std::filesystem::path;
 using Element = XmlElement;
 
 /// A type of cells: its names, its number in mixed topologies, VTK's type, and its points (0: any number).
@@ -308,7 +307,7 @@ vtkSmartPointer<vtkDataObject> read_grids(const XdmfDocument& document, int step
 
 }  // namespace
 
-MeshFile open_xdmf(const Path& path) {
+MeshFile open_xdmf(const std::filesystem::path& path) {
   const auto document = std::make_shared<const XdmfDocument>(path);
   return {document->steps(), [document](int step) { return read_grids(*document, step); }};
 }

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/hdf5/xdmf_document.h
 /// The XML of an XDMF file: which grids there are at each step of time, references between elements, and numbers. Only
 /// the .cpp file includes libxml2. The format: https://www.xdmf.org/index.php/XDMF_Model_and_Format
 

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/lattice_files/lattice_files.h
 /// Readers of voxel files. All of them: @throw std::runtime_error, one line that names the file and the fix, if the
 /// file is missing, has another format, is damaged or cut off, has sizes that do not fit its data, or has a transform
 /// that cannot be inverted. Numbers that are not compressed are read from the file when they are needed, so that it

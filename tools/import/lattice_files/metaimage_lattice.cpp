@@ -16,9 +16,7 @@
 namespace tensorray {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using Path = std::filesystem::path;
 
 bool is_true(const HeaderLines& header, std::initializer_list<const char*> synonyms) {
   return std::any_of(synonyms.begin(), synonyms.end(), [&](const char* name) {
@@ -75,7 +73,7 @@ Eigen::Affine3d to_lps(const HeaderLines& header) {
   const std::vector<double> axes =
       numbers_of(header, {"TransformMatrix", "Orientation", "Rotation"}, {1, 0, 0, 0, 1, 0, 0, 0, 1});
   Eigen::Affine3d transform;  // The header lists the direction of one axis after the other: the columns.
-  transform.linear() = Eigen::Map<const Matrix3d>(axes.data()) *
+  transform.linear() = Eigen::Map<const Eigen::Matrix3d>(axes.data()) *
                        Vector3d(numbers_of(header, {"ElementSpacing", "ElementSize"}, {1, 1, 1}).data()).asDiagonal();
   transform.translation() = Vector3d(numbers_of(header, {"Offset", "Position", "Origin"}, {0, 0, 0}).data());
   require_invertible(header.path, transform, "its TransformMatrix and ElementSpacing cannot be inverted: correct them");
@@ -95,7 +93,7 @@ Eigen::Vector3i size_of(const HeaderLines& header) {
 
 }  // namespace
 
-Lattice open_metaimage(const Path& path, bool is_mask) {
+Lattice open_metaimage(const std::filesystem::path& path, bool is_mask) {
   require_file(path);
   const HeaderLines header = header_lines({path, 0, false, 0}, '=', "ElementDataFile");
   if (header.text("ElementDataFile").empty())

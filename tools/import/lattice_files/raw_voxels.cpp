@@ -4,9 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <memory>
 #include <sstream>
-#include <stdexcept>
 #include <utility>
 
 #include <Eigen/LU>

@@ -1,9 +1,7 @@
 #pragma once
-/// @file tools/import/lattice_files/raw_voxels.h
 /// What readers of voxel files share: headers of text, and numbers that are plain bytes in any order of the axes.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>

@@ -6,8 +6,6 @@
 #include <memory>
 #include <stdexcept>
 #include <tuple>
-#include <utility>
-#include <vector>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>

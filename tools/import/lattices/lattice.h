@@ -1,8 +1,6 @@
 #pragma once
-/// @file tools/import/lattices/lattice.h
 /// Numbers at the voxels of a lattice, as read from a file of voxels, before they become a tensor grid.
 
-#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/lattices/tensor_order.h
 /// The orders in which programs write the components of a tensor, and what the names of components tell of them.
 
 #include <optional>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/meshes/cell_gradients.h
 /// The gradients of a vector that a mesh has at its cells.
 
 #include <vtkSmartPointer.h>

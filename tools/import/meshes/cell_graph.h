@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/meshes/cell_graph.h
 /// Which cells of a mesh are beside each other, and what a solver prescribes for a vector at the mesh's border.
 
 #include <string>

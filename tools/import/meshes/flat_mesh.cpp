@@ -1,7 +1,6 @@
 #include "tools/import/meshes/flat_mesh.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -41,16 +40,10 @@ int max_dimension(vtkDataSet& mesh, vtkGenericCell& cell) {
 template <class Visit>
 void for_each_part(vtkGenericCell& cell, const Visit& visit) {
   const auto id = [&](int i) { return cell.GetPointId(i); };
-  switch (cell.GetCellType()) {
-    case VTK_TRIANGLE:
-      return visit(std::vector<vtkIdType>{id(0), id(1), id(2)});
-    case VTK_QUAD:
-      return visit(std::vector<vtkIdType>{id(0), id(1), id(2), id(3)});
-    case VTK_PIXEL:
-      return visit(std::vector<vtkIdType>{id(0), id(1), id(3), id(2)});
-    default:
-      break;
-  }
+  const int type = cell.GetCellType();
+  if (type == VTK_TRIANGLE) return visit(std::vector<vtkIdType>{id(0), id(1), id(2)});
+  if (type == VTK_QUAD) return visit(std::vector<vtkIdType>{id(0), id(1), id(2), id(3)});
+  if (type == VTK_PIXEL) return visit(std::vector<vtkIdType>{id(0), id(1), id(3), id(2)});
   vtkNew<vtkIdList> corners;
   vtkNew<vtkPoints> points;
   cell.Triangulate(0, corners, points);

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/meshes/flat_mesh.h
 /// Meshes in a plane, as results of two-dimensional solvers: they become slabs.
 
 #include <optional>

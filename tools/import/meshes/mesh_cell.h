@@ -1,9 +1,7 @@
 #pragma once
-/// @file tools/import/meshes/mesh_cell.h
 /// A cell of a mesh, and its interpolation at a point in space.
 
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include <Eigen/Geometry>

@@ -1,7 +1,6 @@
 #include "tools/import/meshes/mesh_faces.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <iterator>
 #include <limits>
 #include <tuple>

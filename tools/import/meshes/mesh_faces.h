@@ -1,8 +1,6 @@
 #pragma once
-/// @file tools/import/meshes/mesh_faces.h
 /// The faces of a mesh's cells, and those on its outside.
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -19,7 +18,6 @@
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
 
-#include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/cell_gradients.h"
 #include "tools/import/meshes/mesh_cell.h"
 
@@ -190,17 +188,8 @@ vtkSmartPointer<vtkDataSet> with_arrays(vtkDataSet& mesh, const Array& of_points
 }  // namespace
 
 const char* flag_of(Take take) {
-  switch (take) {
-    case Take::tensor:
-      return "--array";
-    case Take::gradient:
-      return "--gradient-of";
-    case Take::strain:
-      return "--strain-of";
-    case Take::viscous_stress:
-      break;
-  }
-  return "--viscous-stress-of";
+  constexpr const char* flags[] = {"--array", "--gradient-of", "--strain-of", "--viscous-stress-of"};
+  return flags[static_cast<std::size_t>(take)];
 }
 
 vtkDataSetAttributes& attributes_of(vtkDataSet& mesh, bool of_cells) {

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/meshes/mesh_tensors.h
 /// Makes tensors at the points of a mesh from the arrays that solvers write.
 
 #include <functional>

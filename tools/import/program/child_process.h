@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/program/child_process.h
 /// Isolates work with libraries that may end the process.
 
 #include <functional>

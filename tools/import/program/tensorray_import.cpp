@@ -1,10 +1,8 @@
-/// @file tools/import/program/tensorray_import.cpp
 /// The program `tensorray-import`: everything that needs VTK, Teem or the NIfTI library.
 ///   tensorray-import ARGUMENTS...                    runs `tensorray import ARGUMENTS...`
 ///   tensorray-import --read-vtp EXCHANGE FILE NAME...    VTK polydata, with the named arrays → a file of vtk_files.h
 /// Only volumes/points/vtk_files.h uses the last one. Its errors are one line, without the program's name.
 
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>

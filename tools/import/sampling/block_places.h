@@ -1,9 +1,7 @@
 #pragma once
-/// @file tools/import/sampling/block_places.h
 /// The blocks of a lattice that are sampled.
 
 #include <bitset>
-#include <cstddef>
 #include <optional>
 #include <vector>
 

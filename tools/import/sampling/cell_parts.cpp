@@ -5,7 +5,6 @@
 
 #include "tools/import/sampling/cell_parts.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 

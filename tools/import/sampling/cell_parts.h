@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/sampling/cell_parts.h
 /// Divides a cell into small parts, for sums over its volume.
 
 #include <functional>

@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -26,7 +25,6 @@ namespace tensorray {
 namespace {
 
 using Eigen::AlignedBox3d;
-using Eigen::Vector3d;
 
 constexpr double face_tolerance = 1e-6;  ///< As a fraction of the mesh's diagonal.
 
@@ -48,7 +46,7 @@ std::pair<double, double> peak_and_median(Norms& norms) {
 Norms norms_of_points(vtkDataSet& mesh, const double* tensors, const Solid& solid, const AlignedBox3d& bounds) {
   Norms norms;
   for (vtkIdType point = 0; point < mesh.GetNumberOfPoints(); ++point) {
-    Vector3d position;
+    Eigen::Vector3d position;
     mesh.GetPoint(point, position.data());
     if (solid.points[static_cast<std::size_t>(point)] && bounds.contains(position))
       norms.push_back(norm_of(tensors + 9 * point));

@@ -1,8 +1,6 @@
 #pragma once
-/// @file tools/import/sampling/mesh_sampling.h
 /// Samples tensors on a mesh at the voxels of a lattice.
 
-#include <cstddef>
 #include <optional>
 #include <variant>
 #include <vector>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/sampling/refinement.h
 /// Where a level becomes finer: in bricks with cells that are smaller than its voxels, where it misses the mesh.
 
 #include <vector>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/sampling/sampling_lattice.h
 /// What of a mesh is sampled, the lattice of voxels at which it is, and the blocks of the grid that result.
 
 #include <vector>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/sampling/voxel_average.h
 /// The average of a tensor field over the part of a voxel that a mesh fills.
 
 #include <algorithm>

@@ -1,8 +1,6 @@
 #pragma once
-/// @file tools/import/surfaces/face_triangles.h
 /// Triangles of the faces of cells, flat and curved.
 
-#include <cstddef>
 #include <vector>
 
 #include "base/geometry/triangle_mesh.h"

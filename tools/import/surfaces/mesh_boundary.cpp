@@ -1,5 +1,3 @@
-#include "tools/import/surfaces/mesh_boundary.h"
-
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -8,7 +6,7 @@
 #include <vector>
 
 #include "base/constants.h"
-#include "base/geometry/triangle_mesh.h"
+#include "tools/import/surfaces/body_surface.h"
 #include "tools/import/surfaces/face_triangles.h"
 
 namespace tensorray {

@@ -1,7 +1,5 @@
 #include "tools/import/surfaces/triangle_shells.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>

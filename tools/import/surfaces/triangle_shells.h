@@ -1,8 +1,6 @@
 #pragma once
-/// @file tools/import/surfaces/triangle_shells.h
 /// Measures and cuts closed surfaces that are oriented outwards, of several shells that may touch or overlap.
 
-#include <cstddef>
 #include <vector>
 
 #include "base/geometry/triangle_mesh.h"

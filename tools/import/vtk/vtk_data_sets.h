@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/vtk/vtk_data_sets.h
 /// Files of meshes, and checks and merges the data sets that VTK's readers return.
 
 #include <filesystem>

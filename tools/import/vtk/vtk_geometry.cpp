@@ -120,18 +120,10 @@ void check_types(const Path& path, vtkUnstructuredGrid& grid) {
 double points_of(int type, const std::array<double, 3>& degrees) {
   const auto [x, y, z] = degrees;
   if (!(x >= 1 && y >= 1 && z >= 1)) return -1;
-  switch (type) {
-    case VTK_LAGRANGE_TETRAHEDRON:
-    case VTK_BEZIER_TETRAHEDRON:
-      return x == y && y == z ? (x + 1) * (x + 2) * (x + 3) / 6 : -1;
-    case VTK_LAGRANGE_HEXAHEDRON:
-    case VTK_BEZIER_HEXAHEDRON:
-      return (x + 1) * (y + 1) * (z + 1);
-    case VTK_LAGRANGE_WEDGE:
-      return (x + 1) * (x + 2) / 2 * (z + 1);
-    default:
-      return 0;
-  }
+  if (type == VTK_LAGRANGE_HEXAHEDRON || type == VTK_BEZIER_HEXAHEDRON) return (x + 1) * (y + 1) * (z + 1);
+  if (type == VTK_LAGRANGE_TETRAHEDRON || type == VTK_BEZIER_TETRAHEDRON)
+    return x == y && y == z ? (x + 1) * (x + 2) * (x + 3) / 6 : -1;
+  return type == VTK_LAGRANGE_WEDGE ? (x + 1) * (x + 2) / 2 * (z + 1) : 0;
 }
 
 /// VTK takes the order of a cell from its number of points, or from an array of degrees, and reads that many points.

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/vtk/vtk_messages.h
 /// Catches the messages of VTK's readers, so that they can be thrown: the readers print errors in a file and
 /// continue.
 

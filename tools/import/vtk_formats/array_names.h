@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/vtk_formats/array_names.h
 /// Names the components of arrays, where the format or the file tells them, so that the user need not give their order.
 /// Names that are there stay.
 

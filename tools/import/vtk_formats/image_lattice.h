@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/vtk_formats/image_lattice.h
 /// Converts VTK's images to lattices.
 
 #include "tools/import/lattices/lattice.h"

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/vtk_formats/vtk_tags.h
 /// The tags of VTK's XML files, without a parser: files may be large, and have bytes between tags.
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/vtk_formats/vtp_files.h
 /// Reads VTK polydata (.vtp) with VTK, for programs without VTK (volumes/points/vtk_files.h).
 
 #include <filesystem>

@@ -5,8 +5,6 @@
 #include <iterator>
 #include <map>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include <vtkCGNSReader.h>
 #include <vtkCompositeDataSet.h>
@@ -24,13 +22,10 @@
 #include "base/errors.h"
 #include "base/files/temporary_folder.h"
 #include "base/text/text.h"
-#include "tools/import/cases/ensight.h"
-#include "tools/import/cases/exodus.h"
+#include "tools/import/cases/case_files.h"
 #include "tools/import/cases/openfoam.h"
-#include "tools/import/cases/openfoam_walls.h"
 #include "tools/import/hdf5/hdf5_meshes.h"
 #include "tools/import/meshes/cell_graph.h"
-#include "tools/import/vtk/vtk_data_sets.h"
 #include "tools/import/vtk_formats/array_names.h"
 #include "tools/import/vtk_formats/vtk_tags.h"
 
@@ -39,15 +34,13 @@ namespace {
 
 using Path = std::filesystem::path;
 
-vtkSmartPointer<vtkDataObject> read_xml(const Path& path) {
-  vtkNew<vtkXMLGenericDataObjectReader> reader;
-  reader->SetFileName(path.c_str());
-  reader->Update();
-  return reader->GetOutputDataObject(0);
-}
-
 MeshFile open_xml(const Path& path) {
-  return {1, [path](int) { return read_xml(path); }};
+  return {1, [path](int) -> vtkSmartPointer<vtkDataObject> {
+            vtkNew<vtkXMLGenericDataObjectReader> reader;
+            reader->SetFileName(path.c_str());
+            reader->Update();
+            return reader->GetOutputDataObject(0);
+          }};
 }
 
 MeshFile open_unstructured(const Path& path) {

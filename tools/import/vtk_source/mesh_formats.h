@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/vtk_source/mesh_formats.h
 /// The formats of meshes, and the readers that make VTK data sets of them: a new format is one row of the table.
 
 #include <string>

@@ -5,11 +5,8 @@
 #include <fstream>
 #include <map>
 #include <new>
-#include <optional>
 #include <stdexcept>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 #include <vtkDataSet.h>

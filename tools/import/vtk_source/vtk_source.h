@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/import/vtk_source/vtk_source.h
 /// Reads meshes as VTK data sets, from the formats that solvers write.
 
 #include <filesystem>

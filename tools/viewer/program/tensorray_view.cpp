@@ -1,4 +1,3 @@
-/// @file tools/viewer/program/tensorray_view.cpp
 /// The program `tensorray-view`: a web server for the live view. `tensorray view` starts it.
 
 #include <cerrno>

@@ -1,5 +1,4 @@
 #pragma once
-/// @file tools/viewer/server/server.h
 /// The web server of the live view: a few files over HTTP, and a WebSocket for each page. It runs on one thread
 /// and only passes messages on; Pages has the thread that renders. The view is a program of its own, `tensorray-view`,
 /// because Boost.Beast takes long to compile and rendering does not need it.

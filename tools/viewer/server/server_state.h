@@ -1,8 +1,6 @@
 #pragma once
-/// @file tools/viewer/server/server_state.h
 /// What all connections of a Server share. Private to the sources of the server: it includes Boost.
 
-#include <cstddef>
 #include <map>
 #include <memory>
 #include <optional>

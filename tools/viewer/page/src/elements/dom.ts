@@ -3,12 +3,13 @@
 type Attributes = Record<string, string | boolean | number>;
 type Child = Node | string;
 
-function attach(node: Element, attributes: Attributes, children: Child[]): void {
+function with_parts<T extends Element>(node: T, attributes: Attributes, children: Child[]): T {
   for (const [name, value] of Object.entries(attributes)) {
     if (value === true) node.setAttribute(name, "");
     else if (value !== false) node.setAttribute(name, String(value));
   }
   node.append(...children);
+  return node;
 }
 
 export function element<K extends keyof HTMLElementTagNameMap>(
@@ -16,9 +17,7 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   attributes: Attributes = {},
   ...children: Child[]
 ): HTMLElementTagNameMap[K] {
-  const node = document.createElement(tag);
-  attach(node, attributes, children);
-  return node;
+  return with_parts(document.createElement(tag), attributes, children);
 }
 
 export function svg_element<K extends keyof SVGElementTagNameMap>(
@@ -26,9 +25,7 @@ export function svg_element<K extends keyof SVGElementTagNameMap>(
   attributes: Attributes = {},
   ...children: Child[]
 ): SVGElementTagNameMap[K] {
-  const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  attach(node, attributes, children);
-  return node;
+  return with_parts(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
 }
 
 export function button(text: string, attributes: Attributes, action: () => void): HTMLButtonElement {
