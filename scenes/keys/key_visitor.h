@@ -77,11 +77,21 @@ class MemberOf final : public KeyMember {
   Json schema(const Limits& limits) const override { return Value<T>::schema(member_, limits); }
   Json json() const override { return Value<T>::json(member_); }
 
-  void set_word() override { member_ = T(); }
+  void set_word() override { set_word(member_); }
   bool is_word() const override { return is_word(member_); }
   void resolve(const SceneSource& source) override { resolve(source, member_); }
 
  private:
+  template <class Any>
+  static void set_word(Any& member) {
+    if constexpr (std::is_arithmetic_v<Any>) member = 0;
+  }
+  static void set_word(std::string& member) { member.clear(); }
+  template <class Any>
+  static void set_word(std::optional<Any>& member) {
+    member.reset();
+  }
+
   template <class Any>
   static bool is_word(const Any& member) {
     if constexpr (std::is_arithmetic_v<Any>) return member == Any{};

@@ -194,6 +194,10 @@ TEST_F(PagesTest, AnImportHasTheNameOfItsFile) {
   wrong["light"]["photons"] = -1;
   pages.receive(page, Json{{"type", "scene"}, {"id", 1}, {"scene", wrong}}.dump());
   EXPECT_THAT(mailbox.wait("error", 1).json.at("message").get<std::string>(), testing::HasSubstr("part.vtu"));
+  Json other = hello.at("scene");
+  other["field"]["file"] = "other.vdb";
+  pages.receive(page, Json{{"type", "scene"}, {"id", 4}, {"scene", other}}.dump());
+  EXPECT_THAT(mailbox.wait("error", 4).json.at("message").get<std::string>(), testing::HasSubstr("this view shows"));
   pages.receive(page, Json{{"type", "scene"}, {"id", 2}, {"scene", hello.at("scene")}}.dump());
   mailbox.final_picture(2);
   pages.receive(page, Json{{"type", "export"}, {"id", 3}, {"file", "png"}}.dump());

@@ -89,17 +89,22 @@ Lattice placed(Lattice lattice, const ImportSettings& settings) {
 }
 
 /// A mask in one of VTK's formats: an image, of which one array has one number at each voxel.
-Lattice open_image_mask(const std::filesystem::path& file, ImportReport& report) {
-  const auto data = read_vtk_source(file, std::nullopt, &report.notes);
+Lattice open_image_mask(const std::filesystem::path& file) try {
+  std::vector<std::string> notes;
+  const auto data = read_vtk_source(file, std::nullopt, &notes);
   vtkSmartPointer<vtkImageData> image(vtkImageData::SafeDownCast(data));
   std::vector<std::pair<vtkDataArray*, bool>> arrays;
   for_each_array(*data, [&](vtkDataArray& array, bool of_cells) {
     if (array.GetNumberOfComponents() == 1) arrays.emplace_back(&array, of_cells);
   });
   if (!image || arrays.size() != 1)
-    throw std::invalid_argument("--mask " + file.string() +
-                                ": a mask has voxels, and one array of one number at each; " + list_of_arrays(*data));
-  return lattice_of(std::move(image), arrays.front().first, arrays.front().second);
+    throw std::runtime_error("a mask has voxels, and one array of one number at each; " + list_of_arrays(*data));
+  Lattice mask = lattice_of(std::move(image), arrays.front().first, arrays.front().second);
+  mask.notes = std::move(notes);
+  return mask;
+} catch (const std::exception& error) {
+  throw std::invalid_argument("--mask: NIfTI, NRRD, MetaImage, MRtrix, .npy or an image of VTK is needed; " +
+                              file.string() + ": " + error.what());
 }
 
 /// Those in voxels of the mask that are not 0. It may have other voxels than the grid, in the same world.
@@ -109,7 +114,7 @@ void apply_mask(TensorGrid& grid, const ImportSettings& settings, ImportReport& 
   const bool is_npy = open == open_npy;
   if (is_npy && lattice_reader(settings.files.front()) != open_npy)
     throw std::invalid_argument("--mask " + file.string() + ": .npy does not say where it is, and is for .npy alone");
-  Lattice mask = open ? open(file, true) : open_image_mask(file, report);
+  Lattice mask = open ? open(file, true) : open_image_mask(file);
   if (is_npy) mask = placed(std::move(mask), settings);
   for (const std::string& note : mask.notes) report.notes.push_back("--mask: " + note);
   const std::size_t slice = std::size_t(mask.size.x()) * std::size_t(mask.size.y());

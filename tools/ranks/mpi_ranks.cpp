@@ -33,7 +33,8 @@ class MpiRanks : public JoinedRanks {
   std::size_t count() const override { return static_cast<std::size_t>(count_); }
 
   std::vector<std::string> all_gather(const std::string& mine) override {
-    std::vector<std::string> all = room_for_all(mine);
+    std::vector<std::string> all = room_for(wait_for_all(mine.size()));
+    all[rank()] = mine;
     for (int root = 0; root < count_; ++root) {
       std::string& bytes = all[static_cast<std::size_t>(root)];
       broadcast_from(root, bytes.data(), bytes.size());
@@ -42,17 +43,21 @@ class MpiRanks : public JoinedRanks {
   }
 
   std::vector<std::string> gather(const std::string& mine) override {
-    std::vector<std::string> all = room_for_all(mine);
-    for (int from = 1; from < count_ && (rank_ == 0 || rank_ == from); ++from) {
+    const std::vector<std::uint64_t> sizes = wait_for_all(mine.size());
+    if (rank_ > 0) {
+      in_pieces(mine.data(), mine.size(),
+                [](const char* piece, int count) { MPI_Send(piece, count, MPI_BYTE, 0, 0, MPI_COMM_WORLD); });
+      return {};
+    }
+    std::vector<std::string> all = room_for(sizes);
+    all[0] = mine;
+    for (int from = 1; from < count_; ++from) {
       std::string& bytes = all[static_cast<std::size_t>(from)];
       in_pieces(bytes.data(), bytes.size(), [&](char* piece, int count) {
-        if (rank_ == 0)
-          MPI_Recv(piece, count, MPI_BYTE, from, 0, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
-        else
-          MPI_Send(piece, count, MPI_BYTE, 0, 0, MPI_COMM_WORLD);
+        MPI_Recv(piece, count, MPI_BYTE, from, 0, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
       });
     }
-    return rank_ == 0 ? all : std::vector<std::string>();
+    return all;
   }
 
   void broadcast(void* bytes, std::size_t size) override {
@@ -81,11 +86,9 @@ class MpiRanks : public JoinedRanks {
     in_pieces(bytes, size, [&](char* piece, int count) { MPI_Bcast(piece, count, MPI_BYTE, root, MPI_COMM_WORLD); });
   }
 
-  /// The bytes of this rank, and room for those of the others.
-  std::vector<std::string> room_for_all(const std::string& mine) const {
+  static std::vector<std::string> room_for(const std::vector<std::uint64_t>& sizes) {
     std::vector<std::string> all;
-    for (const std::uint64_t size : wait_for_all(mine.size())) all.emplace_back(size, 0);
-    all[rank()] = mine;
+    for (const std::uint64_t size : sizes) all.emplace_back(size, 0);
     return all;
   }
 

@@ -11,6 +11,7 @@
 #include "base/errors.h"
 #include "base/files/output_file.h"
 #include "base/process/seconds.h"
+#include "base/text/path_text.h"
 #include "base/text/text.h"
 #include "integrators/methods/read_scene.h"
 #include "scenes/description/check_scene.h"
@@ -210,6 +211,11 @@ SceneDescription Pages::read(const Json& scene) const {
 
 void Pages::check(const Json& scene) const {
   const SceneDescription description = read(scene);
+  const Json::json_pointer pointer("/field/file");
+  const Json file = scene.value(pointer, Json());
+  if (!viewed_.imported.empty() && !file.is_null() && file != scene_.value(pointer, Json()))
+    throw SceneError("`/field/file`: this view shows " + viewed_.file.string() +
+                     "; start another one for another file");
   require_files(description, allowed_);
   require_moderate(description);
 }
@@ -423,8 +429,11 @@ void Pages::export_file(const PagePointer& pointer, const Json& message) {
   for (const Output& output : picture_outputs())
     if (std::find(output.endings.begin(), output.endings.end(), ending) != output.endings.end())
       output.write(file, live_.scene(), *render);
-  const std::string name = viewed_.file.stem().string() + ending;
-  page.send(binary_message(answer_to(message, "file", {{"name", name}}), bytes_of(file), false));
+  std::filesystem::path name = std::filesystem::weakly_canonical(viewed_.file).filename();  // Of a folder, "." too.
+  if (lower_case_ending(name) == ".gz") name.replace_extension();
+  if (!std::filesystem::is_directory(viewed_.file)) name.replace_extension();
+  name += ending;
+  page.send(binary_message(answer_to(message, "file", {{"name", text_of_path(name)}}), bytes_of(file), false));
 }
 
 }  // namespace tensorray

@@ -48,9 +48,9 @@ struct CausticSettings {
 /// triangles at a tear. What lands beside the plate counts as missed.
 /// @param plate  The plate of the map.
 /// @param bands  In the order of their places, without gaps between those that have a width.
-/// The sums are integers, so that the result is the same for any number of threads and ranks; only the root has it.
-/// Memory: the films, and 32 bytes for each pixel and thread, if this is no more than 256 MiB; else the
-/// plate is drawn in strips. @throw Cancelled; as Ranks::gather.
+/// The sums are integers, so that films are the same for any number of threads and ranks. All ranks have them; the
+/// power of all ends has the root alone. Memory: the films, and 32 bytes for each pixel and thread, if this is no more
+/// than 256 MiB; else the plate is drawn in strips. @throw Cancelled; as Ranks::sum.
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
                      const CausticSettings& settings, const Progress& progress);
 
