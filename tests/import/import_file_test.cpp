@@ -98,7 +98,8 @@ TEST(ImportFileTest, AnImageOfVtkMayBeAMask) {
   for (const auto& [file, text] : {std::pair("none.vti", "rate (3 components"),
                                    {"several.vti", "other (1 component"},
                                    {"bar.vtu", "a mask has voxels"}})
-    EXPECT_THAT([&, file = file] { active(file); }, testing::ThrowsMessage<std::invalid_argument>(HasSubstr(text)));
+    EXPECT_THAT(([&active, file = file] { active(file); }),
+                testing::ThrowsMessage<std::invalid_argument>(HasSubstr(text)));
 }
 
 std::string joined(const std::vector<std::string>& lines) {
