@@ -87,7 +87,6 @@ TEST(ImportFileTest, AnImageOfVtkMayBeAMask) {
   mask("several.vti", true, 2, 1);
   ImportSettings settings;
   settings.files = {folder / "a.vti"};
-  settings.order = TensorOrder::full;
   ImportReport report;
   const auto active = [&](const char* file) {
     settings.mask = folder / file;
