@@ -136,9 +136,9 @@ std::vector<double> HeaderLines::numbers(const std::string& name, std::vector<do
   std::istringstream words(list);
   std::vector<double> numbers;
   for (std::string word; words >> word;) {
-    char* end = nullptr;
-    numbers.push_back(std::strtod(word.c_str(), &end));
-    if (*end != '\0') fail(path, "its header is damaged: " + name);
+    char* rest = nullptr;
+    numbers.push_back(std::strtod(word.c_str(), &rest));
+    if (*rest != '\0') fail(path, "its header is damaged: " + name);
   }
   return numbers;
 }
