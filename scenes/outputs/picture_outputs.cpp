@@ -103,8 +103,7 @@ void draw_annotations(const Scene& scene, const Render& render, double exposure,
   if (!is_lettered) return;
   if (render.view) {
     const Eigen::Vector3d &right = render.view->right, &up = render.view->up;
-    if (output.wants(Annotation::scale) && !(output.default_annotations && render.view->is_perspective))
-      draw_scale_bar(image, render.view->pixel_size, units.length);
+    if (output.wants(Annotation::scale)) draw_scale_bar(image, render.view->pixel_size, units.length);
     if (output.wants(Annotation::axes)) draw_axes(image, right, up);
     if (units.is_anatomical && (output.wants(Annotation::axes) || output.default_annotations))
       draw_anatomy(image, right, up, render.draw_legend ? render.legend_room : 0);

@@ -23,11 +23,12 @@ void warn_of_step_limit(Render& render) {
 /// Where an annotation has no meaning for a picture.
 void warn_of_annotations(const Scene& scene, Render& render) {
   const OutputDescription& output = scene.description.output;
-  if (!render.view || output.default_annotations) return;
+  if (!render.view) return;
   if (output.wants(Annotation::scale) && render.view->is_perspective)
     render.notes.push_back(
         "the scale bar is right where the camera is focused, by default the middle of what it shows, as the camera is "
         "in perspective");
+  if (output.default_annotations) return;
   if ((output.wants(Annotation::body) || output.wants(Annotation::hidden)) && render.outline.empty())
     render.warnings.push_back(
         "`/output/annotations`: there are no lines of a body: light on a plate and a lens have them, where the field "
