@@ -31,8 +31,8 @@ struct Caustic {
   std::vector<EndCounts> ends;                           ///< Number of vertices by the end of each channel's light.
 };
 
-/// Distance, in pixels, between the places where a triangle is drawn. (With 1, the light of a sheared strip is within 2%:
-/// Caustic.ABandIsSweptInStepsOfAPixel.)
+/// Distance, in pixels, between the places where a triangle is drawn. (With 1, the light of a sheared strip is within
+/// 2%: Caustic.ABandIsSweptInStepsOfAPixel.)
 constexpr double usual_step = 0.65;
 
 struct CausticSettings {
