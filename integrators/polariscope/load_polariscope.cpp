@@ -173,7 +173,7 @@ std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const
   return [=](Image& image, double exposure) {
     const double gain = std::exp2(exposure);
     draw_color_bar(
-        image, {"nm", range, [&](double position) -> Eigen::Vector3d { return gain * color(position); }});
+        image, {"retardance\nnm", range, [&](double position) -> Eigen::Vector3d { return gain * color(position); }});
     draw_directions(image, directions);
   };
 }

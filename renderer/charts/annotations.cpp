@@ -181,7 +181,7 @@ void draw_axes(Image& image, const Vector3d& right, const Vector3d& up) {
 void draw_directions(Image& image, const std::vector<std::pair<std::string, double>>& directions) {
   const Sizes sizes(image);
   const double from_corner = sizes.margin + 4 * sizes.letter;
-  const Vector2d center(image.width - from_corner, from_corner);
+  const Vector2d center(image.width - legend_width(image.width, image.height) - from_corner, from_corner);
   std::vector<Mark> marks;
   for (const auto& [text, angle] : directions) {
     const Vector2d along(std::cos(angle * pi / 180), -std::sin(angle * pi / 180)), tip = 2 * sizes.letter * along;

@@ -36,8 +36,8 @@ void draw_caption(Image& image, const std::string& text);
 /// @param right, up  Directions of the picture in the world; unit, normal to each other.
 void draw_axes(Image& image, const Eigen::Vector3d& right, const Eigen::Vector3d& up);
 
-/// Draws lines through one point in the upper right corner, each with a text at one end, and its angle from right to
-/// up, degrees.
+/// Draws lines through one point in the upper right corner of what is beside a legend (with_room_beside), each with a
+/// text at one end, and its angle from right to up, degrees.
 void draw_directions(Image& image, const std::vector<std::pair<std::string, double>>& directions);
 
 /// The letters of a direction of a patient in RAS: R, L (right, left: +x, -x), A, P (anterior, posterior: y), S, I
