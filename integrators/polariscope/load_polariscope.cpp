@@ -121,8 +121,7 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
     const Spectrum table = read_coefficients(*file, scene.description.light, wavelength);
     loaded.stress_optic = table.at(wavelength);
     light.relative = [table, wavelength, at_reference = loaded.stress_optic](double other) {
-      const double inside =
-          std::clamp(other, table.wavelengths.front(), table.wavelengths.back());  // But for rounding.
+      const double inside = std::clamp(other, table.wavelengths.front(), table.wavelengths.back());
       return table.at(inside) / at_reference * wavelength / other;
     };
   } else if (const auto* number = std::get_if<double>(&settings.stress_optic)) {
@@ -145,11 +144,7 @@ LoadedLightOfPolariscope load_polariscope(const Scene& scene, const PolariscopeD
 std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const LoadedLightOfPolariscope& loaded,
                                                        double greatest) {
   std::vector<MeanLight> analyses;
-  std::vector<double> relative;
-  for (const Band& band : loaded.light.bands) {
-    analyses.push_back(analyses_of(loaded.arrangement, band.wavelength)[0]);
-    relative.push_back(loaded.light.relative(band.wavelength));
-  }
+  for (const Band& band : loaded.light.bands) analyses.push_back(analyses_of(loaded.arrangement, band.wavelength)[0]);
   const auto& [before, after] = loaded.arrangement;
   const auto is_retarder = [](const Element& element) { return element.kind == ElementKind::retarder; };
   const bool has_sign =
@@ -161,10 +156,11 @@ std::function<void(Image&, double)> polariscope_legend(const Scene& scene, const
   const double twice = ((polarizer ? polarizer->angle : 0) + 45) * pi / 90;
   const Eigen::Vector2d axis(std::cos(twice), std::sin(twice));  // The slow one.
   const ValueRange range{has_sign ? -greatest : 0, greatest};
-  const auto color = [=, colors = band_colors(scene), wavelength = loaded.wavelength](double position) {
+  const auto color = [=, colors = band_colors(scene)](double position) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (std::size_t k = 0; k < analyses.size(); ++k) {
-      const double half = pi * range.value(position) / wavelength * relative[k];
+      const double relative = loaded.light.relative(loaded.light.bands[k].wavelength);
+      const double half = pi * range.value(position) / loaded.wavelength * relative;
       const Eigen::Quaterniond plate(std::cos(half), std::sin(half) * axis.x(), std::sin(half) * axis.y(), 0);
       sum += analyses[k].dot(light_of(plate)) * colors.col(static_cast<Eigen::Index>(k));
     }

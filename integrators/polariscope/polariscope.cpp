@@ -34,7 +34,7 @@ struct PolarTracer::Packet {
   };
   std::vector<Section> sections;
   RaySteps sampled;
-  std::vector<RayTurns> turns;
+  std::array<std::vector<Turn>, ray_lanes> turns;
   std::array<double, ray_lanes> phase;  // Σ √(a² + b²) h, of a relative strength of 1.
   std::vector<float> planes;
   struct Sum {  // Of each pixel: quaternions w, x, y, z; samples in the field.
@@ -116,7 +116,8 @@ void PolarTracer::sample(Packet& packet) const {
   for (std::size_t i = 0; i < ray_lanes; ++i)
     for (int axis = 0; axis < 3; ++axis) sampled.origin[axis][i] = packet.rays[i].index[axis];
   packet.phase.fill(0);
-  packet.turns.clear();
+  for (std::vector<Turn>& turns : packet.turns) turns.clear();
+  RayTurns last{};
   for (const Packet::Section& section : packet.sections) {
     const double most = *std::max_element(std::begin(section.count), std::end(section.count));
     for (double step = 0; step < most; ++step) {
@@ -128,8 +129,12 @@ void PolarTracer::sample(Packet& packet) const {
         sampled.length[i] = static_cast<float>(length);
       }
       sampler.sample(sampled);
-      packet.turns.push_back(turns_of(sampled));
-      for (std::size_t i = 0; i < ray_lanes; ++i) packet.phase[i] += packet.turns.back().phase[i];
+      add_turns(sampled, last);
+      for (std::size_t i = 0; i < ray_lanes; ++i) {
+        if (!last.joined[i] || packet.turns[i].empty()) packet.turns[i].emplace_back();
+        packet.turns[i].back() = {last.alpha[i], last.beta[i], last.gamma[i], last.squares[i]};
+        packet.phase[i] += last.phase[i];
+      }
     }
   }
 }
@@ -138,25 +143,20 @@ void PolarTracer::sample(Packet& packet) const {
 void PolarTracer::add(std::size_t lane, float weight, std::size_t x, Packet& packet, LightRow& row) const {
   const Ray& ray = packet.rays[lane];
   if (!ray.is_lit) return;
-  float* const light = row.bands.data() + 10 * room_ * x;
-  if (ray.sections == 0) {
-    for (const std::size_t i : {0, 4, 8, 9})
-      for (std::size_t k = 0; k < room_; ++k) light[i * room_ + k] += weight;
-    return;
-  }
-  PolarPoint& point = row.points[x];
+  const bool is_inside = ray.sections > 0;
   const double phase = 2 * packet.phase[lane] / greatest_;
-  point.integral += std::copysign(phase, light_.strength);
-  point.length += ray.length;
-  ++packet.sums[x].inside;
+  row.points[x].integral += std::copysign(phase, light_.strength);
+  row.points[x].length += ray.length;
+  if (is_inside) ++packet.sums[x].inside;
   if (room_ == 0) return;
   packet.planes.resize(4 * room_);
   std::size_t stride = most_wavelengths;
   for (double change = phase * widest_; change > 1 && stride > 1; change /= 3) stride /= 3;
   const float part = weight * static_cast<float>(stride) / most_wavelengths;
   for (std::size_t i = stride / 2; i < most_wavelengths; i += stride) {
-    turn(packet.turns, lane, strengths_[i].data(), room_, part, packet.planes.data(), light);
-    if (i == most_wavelengths / 2)  // The middle of the band.
+    turn(packet.turns[lane], strengths_[i].data(), room_, part, packet.planes.data(),
+         row.bands.data() + 10 * room_ * x);
+    if (is_inside && i == most_wavelengths / 2)  // The middle of the band.
       for (std::size_t c = 0; c < 4; ++c)
         packet.sums[x].mean[static_cast<int>(c)] += packet.planes[c * room_ + light_.reference];
   }

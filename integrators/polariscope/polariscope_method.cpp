@@ -122,8 +122,7 @@ std::string LoadedPolariscope::traced_key(const Scene& scene) const {
     std::error_code none;
     key += fmt::format(" {}", std::filesystem::last_write_time(input.path, none).time_since_epoch().count());
   }
-  const Eigen::Matrix3Xd colors = band_colors(scene);
-  for (const double value : colors.reshaped()) key += fmt::format(" {}", value);
+  for (const double value : band_colors(scene).reshaped().eval()) key += fmt::format(" {}", value);
   const Eigen::Vector3d& V = loaded_.light.direction;
   return key + fmt::format(" {} {} {} {}", V.x(), V.y(), V.z(), loaded_.stress_optic);
 }

@@ -19,19 +19,27 @@ struct RaySteps {
 /// Gauss' points of a step are before and behind its middle by this part of its length.
 constexpr double gauss_point = 0.28867513459481287;
 
-/// What steps do to light of relative strength g, the phase by which a wavelength is turned compared with the one that
-/// is turned most (−1 ≤ g ≤ 1). The matrix of a step is the exponential of
+/// What steps of rays do to light of relative strength g, the phase by which a wavelength is turned compared with the
+/// one that is turned most (−1 ≤ g ≤ 1). The matrix of a step is the exponential of
 ///   −i (g α σ_z + g β σ_x + g² γ σ_y),
 /// Magnus' exponent of fourth order, whose last part is the turning of the axes.
 struct RayTurns {
   float alpha[ray_lanes], beta[ray_lanes], gamma[ray_lanes];  ///< Of a part of the step: its angle is small, ...
-  float square[ray_lanes];                                    ///< α² + β².
   int squares[ray_lanes];                                     ///< ... and its matrix is squared so many times.
   float phase[ray_lanes];                                     ///< ∫√(a² + b²) dz of the whole step.
+  int joined[ray_lanes];  ///< Whether α, β and γ are also those of the step before.
 };
 
-/// @param steps  With a and b of g = 1.
-RayTurns turns_of(const RaySteps& steps);
+/// Those of a ray: of one step, or of several with small angles.
+struct Turn {
+  float alpha, beta, gamma;
+  int squares;
+};
+
+/// Sets the turns of steps. They are joined to those of the steps before where that leaves out a millionth of them (the
+/// series of Baker, Campbell and Hausdorff).
+/// @param steps  With a and b of g = 1. @param turns  Before: of the steps before; at first 0.
+void add_turns(const RaySteps& steps, RayTurns& turns);
 
 /// Arrays of wavelengths have room for this count of numbers.
 constexpr std::size_t turning_room(std::size_t count) { return (count + 15) / 16 * 16; }
@@ -40,7 +48,7 @@ constexpr std::size_t turning_room(std::size_t count) { return (count + 15) / 16
 /// `weight`, and the weight itself.
 /// @param turns  In the order of the light. @param strengths  g of as many wavelengths as there is `room`.
 /// @param quaternions  w, x, y, z: each `room` numbers. @param light  Ten planes of `room` numbers (LightRow).
-void turn(const std::vector<RayTurns>& turns, std::size_t ray, const float* strengths, std::size_t room, float weight,
-          float* quaternions, float* light);
+void turn(const std::vector<Turn>& turns, const float* strengths, std::size_t room, float weight, float* quaternions,
+          float* light);
 
 }  // namespace tensorray
