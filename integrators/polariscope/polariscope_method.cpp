@@ -116,7 +116,7 @@ class LoadedPolariscope : public LoadedMethod {
 std::string LoadedPolariscope::traced_key(const Scene& scene) const {
   Json json = Json::parse(scene.description.text);
   for (const char* key : {"output", "camera", "lights", "objects", "seed"}) json.erase(key);
-  for (const char* key : {"arrangement", "angle", "analyzer", "type"}) json["integrator"].erase(key);
+  for (const char* key : scene.description.integrator.method().analysis_keys()) json["integrator"].erase(key);
   std::string key = json.dump();
   for (const NamedFile& input : input_files(scene.description)) {
     std::error_code none;
@@ -229,6 +229,7 @@ class PolariscopeMethod : public MethodWith<PolariscopeDescription> {
   const char* name() const override { return "polariscope"; }
   bool shows_plate() const override { return true; }
   bool bends_light() const override { return false; }
+  std::vector<const char*> analysis_keys() const override { return {"arrangement", "angle", "analyzer"}; }
 
   std::vector<std::string> channels(const SceneDescription&) const override {
     return channel_names(polariscope_channels());

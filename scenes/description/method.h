@@ -101,6 +101,9 @@ class Method {
   /// Whether the field bends its light: it has a scale then, and a direction in which it shows most.
   virtual bool bends_light() const { return true; }
 
+  /// Keys of `integrator` that change what is seen of the light, but no ray (KeptResults has what is traced).
+  virtual std::vector<const char*> analysis_keys() const { return {}; }
+
   /// The files that the method reads, as its keys name them.
   virtual std::vector<NamedFile> inputs() const { return {}; }
 

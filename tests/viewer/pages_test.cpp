@@ -63,6 +63,26 @@ TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
   EXPECT_EQ(exported.pixels, expected.pixels);
 }
 
+/// Of light that is traced, the finished picture is there at once.
+TEST_F(PagesTest, ATurnedAnalyserHasNoCoarsePicture) {
+  const auto first_picture = [&](int id, const Json& scene) {
+    send_scene(id, scene);
+    const Json first = mailbox_.wait("picture", id).json;
+    mailbox_.final_picture(id);
+    return first;
+  };
+  Json scene = test::small_scene();
+  scene["integrator"] = {{"type", "polariscope"}};
+  EXPECT_LT(first_picture(1, scene).at("width"), 64);
+  scene["integrator"]["analyzer"] = 10;
+  const Json turned = first_picture(2, scene);
+  EXPECT_EQ(turned.at("width"), 64);
+  EXPECT_TRUE(turned.at("final"));
+  EXPECT_EQ(picture_of(mailbox_.final_picture(2), ".png").width, 64);
+  scene["integrator"]["samples"] = 1;  // All is traced again.
+  EXPECT_LT(first_picture(3, scene).at("width"), 64);
+}
+
 /// Scenes that come while the page's thread is busy: here, while it sends its first message.
 TEST_F(PagesTest, TheNewestSceneWins) {
   std::promise<void> all_sent;

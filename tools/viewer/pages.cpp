@@ -1,6 +1,7 @@
 #include "tools/viewer/pages.h"
 
 #include <algorithm>
+#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -22,6 +23,7 @@ namespace {
 
 constexpr std::size_t max_requests = 32;  // Of one page, waiting.
 constexpr int coarsest = 16;
+constexpr auto idle = std::chrono::milliseconds(100);  // Before what no page asked for is made.
 constexpr double soon = 0.1, very_soon = 0.03;  // Seconds that a first picture may take, and that allow a finer one.
 
 const std::vector<std::string> request_types{"scene", "look", "space", "save", "export"};
@@ -222,18 +224,23 @@ void Pages::check(const Json& scene) const {
 
 void Pages::begin_scene(Page& page, const Request& request) {
   const Json id = request.message.value("id", Json());
+  const bool was_finished = std::exchange(page.is_finished, false);
   page.stages.clear();
   try {
-    check(request.message["scene"]);
-    page.shown = request.message["scene"];
+    const Json& scene = request.message["scene"];
+    check(scene);
+    const SceneDescription description = read(scene);
+    const Method& method = description.integrator.method();
+    const bool has_light = was_finished && differ_in(method.analysis_keys(), page.shown, scene);
+    page.shown = scene;
     page.shown_id = id;
     page.landed.reset();
-    const SceneDescription description = read(page.shown);
-    page.stages = stages_of(coarseness_, description.integrator.method().is_sampled());
+    page.stages = stages_of(coarseness_, method.is_sampled());
     const auto is_there = [&](const Stage& stage) {
-      return stage.is_final() && live_.has_picture(page.shown, outputs_of(description, stage, folder_ / ""));
+      return stage.is_final() &&
+             (has_light || live_.has_picture(page.shown, outputs_of(description, stage, folder_ / "")));
     };
-    // Where only colours change, only the finished picture is sent again.
+    // Where only colours change, or what is seen of light that is traced, only the finished picture is sent again.
     const auto first = std::find_if(page.stages.begin(), page.stages.end(), is_there);
     if (first == page.stages.end()) return;
     page.stages.erase(page.stages.begin(), first);
@@ -263,7 +270,12 @@ void Pages::make_stage(const PagePointer& page) {
   page->stages.pop_front();
   const bool is_first = stage.is_first();
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    std::unique_lock<std::mutex> lock(mutex_);
+    const auto is_asked = [&] {
+      return ends_ || std::any_of(pages_.begin(), pages_.end(),
+                                  [](const PagePointer& any) { return any->scene || !any->requests.empty(); });
+    };
+    if (stage.is_known && wake_.wait_for(lock, idle, is_asked)) return page->stages.push_front(stage);
     if (page->scene && !is_first) return;
     progress_.cancelled = ends_;
     rendering_ = {page, is_first};
@@ -285,6 +297,7 @@ void Pages::make_stage(const PagePointer& page) {
     is_loaded = true;
     const double seconds_loading = seconds_since(start);
     page->render = live_.render(progress_);
+    page->is_finished = stage.is_final();
     if (stage.is_known)
       page->send(text_message({{"type", "details"}, {"id", page->shown_id}}));
     else

@@ -76,6 +76,7 @@ class Pages {
     std::shared_ptr<const LandedRays> landed;  ///< Of `shown`, if a pixel of it was asked for.
     std::shared_ptr<const Render> render;      ///< The last picture, ...
     Image display;                             ///< ... and as the page shows it.
+    bool is_finished = false;                  ///< Whether that is the finished picture of `shown`.
   };
   /// The resolution of a plate, in the finished picture of a scene.
   struct KnownPlate {

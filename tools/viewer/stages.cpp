@@ -125,6 +125,14 @@ std::deque<Stage> stages_of(int coarseness, bool is_sampled) {
   return stages;
 }
 
+bool differ_in(const std::vector<const char*>& keys, const Json& scene, const Json& other) {
+  const auto others = [&](Json json) {
+    json["integrator"] = without(section(json, "integrator"), keys);
+    return json;
+  };
+  return scene != other && others(scene) == others(other);
+}
+
 Json at_stage(const Json& scene, const SceneDescription& description, const Eigen::Vector2i& resolution,
               const Stage& stage) {
   Json result = scene;

@@ -43,6 +43,9 @@ struct Stage {
 /// @param is_sampled  Method::is_sampled.
 std::deque<Stage> stages_of(int coarseness, bool is_sampled);
 
+/// Whether two scenes differ in these keys of `integrator` alone.
+bool differ_in(const std::vector<const char*>& keys, const Json& scene, const Json& other);
+
 /// The scene of a stage.
 /// @param resolution  Of the plate, in the finished picture.
 Json at_stage(const Json& scene, const SceneDescription& description, const Eigen::Vector2i& resolution,
