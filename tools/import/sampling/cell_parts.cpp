@@ -28,7 +28,11 @@ std::array<int, 3> powers(Shape shape) {
 }
 
 /// ∫ (1 − c)^k dc over an interval.
-double mass(int k, double from, double to) { return (std::pow(1 - from, k + 1) - std::pow(1 - to, k + 1)) / (k + 1); }
+double mass(int k, double from, double to) {
+  double near = 1 - from, far = 1 - to;
+  for (int i = 0; i < k; ++i) near *= 1 - from, far *= 1 - to;
+  return (near - far) / (k + 1);
+}
 
 /// The mean of c over the interval with the density (1 − c)^k.
 double mean(int k, double from, double to) {
@@ -78,12 +82,15 @@ class Divider {
     cell_.evaluate(parametric(shape_, centre, tangents), part_);
     tangents *= (piece.to - piece.from).matrix().asDiagonal();
     const Matrix3d edges = cell_.jacobian() * tangents;
+    const Vector3d reach = 0.5 * edges.cwiseAbs().rowwise().sum();
     // Twice as far as an affine piece reaches, because edges that are not parallel differ in length.
-    const Vector3d reach = edges.cwiseAbs().rowwise().sum();
-    if (!where_.intersects(Eigen::AlignedBox3d(cell_.position() - reach, cell_.position() + reach))) return;
+    if (is_outside(2 * reach)) return;
     const Eigen::RowVector3d lengths = (longest_.cwiseInverse().asDiagonal() * edges).colwise().norm();
     Eigen::Index axis = 0;
-    if (!(lengths.maxCoeff(&axis) > rounded_one)) return visit_part(volume, centre, edges, tangents);
+    if (!(lengths.maxCoeff(&axis) > rounded_one)) {
+      if (!is_outside(reach)) visit_part(volume, centre, edges, tangents);
+      return;
+    }
     Piece first = piece, second = piece;
     first.to[axis] = second.from[axis] = 0.5 * (piece.from[axis] + piece.to[axis]);
     divide(first);
@@ -92,6 +99,10 @@ class Divider {
 
  private:
   static constexpr double rounded_one = 1 + 1e-6;
+
+  bool is_outside(const Vector3d& reach) const {
+    return !where_.intersects(Eigen::AlignedBox3d(cell_.position() - reach, cell_.position() + reach));
+  }
 
   void visit_part(double volume, const Array3d& centre, const Matrix3d& edges, const Matrix3d& tangents) {
     if (shape_ == Shape::pyramid) volume *= 0.5;  // Its height.

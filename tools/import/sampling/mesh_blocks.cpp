@@ -110,6 +110,9 @@ bool load(const MeshSource& source, MeshCell& cell, vtkIdType id) {
 struct Workspace {
   MeshCell cell;
   std::vector<VoxelAverage> averages = std::vector<VoxelAverage>(TensorBlock::voxels);
+  /// Of samples of a part, in each voxel: Σ c cᵀ over c = (1, coordinates along its edges in [−1/2, 1/2]).
+  std::vector<Eigen::Matrix4d> moments = std::vector<Eigen::Matrix4d>(TensorBlock::voxels, Eigen::Matrix4d::Zero());
+  std::vector<std::size_t> sampled;                    ///< The voxels that have some.
   std::array<double, TensorBlock::voxels> fineness{};  ///< Of the finest cell in each voxel.
   std::array<int, TensorBlock::voxels> layer{};        ///< From which each voxel has its value.
 };
@@ -194,12 +197,14 @@ AlignedBox3d box_of(const MeshSource& source, const TensorBlock& block, const Vo
   return {lattice.position(box.min()) - 0.5 * lattice.voxel, lattice.position(box.max()) + 0.5 * lattice.voxel};
 }
 
-/// The change of the tensor along the edges of a part of `cell`.
-Eigen::Matrix<double, 9, 3> changes_in(const MeshSource& source, const MeshCell& cell, const CellPart& part) {
-  Eigen::Matrix<double, 9, 3> sum = Eigen::Matrix<double, 9, 3>::Zero();
-  if (!source.point_tensors) return sum;
-  for (int i = 0; i < cell.points(); ++i)
-    sum.noalias() += Eigen::Map<const Tensor>(source.point_tensors + 9 * cell.point(i)) * part.changes.row(i);
+/// The tensor at the centroid of a part of `cell`, and its changes along the part's edges.
+Eigen::Matrix<double, 9, 4> tensors_in(const MeshSource& source, const MeshCell& cell, vtkIdType id,
+                                       const CellPart& part) {
+  Eigen::Matrix<double, 9, 4> sum = Eigen::Matrix<double, 9, 4>::Zero();
+  sum.col(0) = tensor_in(source, cell, id, part.weights);
+  for (int i = 0; source.point_tensors && i < cell.points(); ++i)
+    sum.rightCols<3>().noalias() +=
+        Eigen::Map<const Tensor>(source.point_tensors + 9 * cell.point(i)) * part.changes.row(i);
   return sum;
 }
 
@@ -218,30 +223,50 @@ Eigen::Array3d sample_counts(const Vector3d& centre, const Eigen::Matrix3d& edge
   return counts;
 }
 
-/// Adds samples of a part, evenly spaced along its edges, to the averages of the voxels of the block that they are in.
+/// Sums moments of samples of a part, evenly spaced along its edges, in the voxels of a block that they are in.
+/// @param centre, edges  From the block's first voxel, in voxels.
+void sum_moments(const Vector3d& centre, const Eigen::Matrix3d& edges, const Eigen::Array3d& counts, Workspace& work) {
+  // Places count voxels from the corner of the block before, so that rounding towards zero is down. Vectors of four
+  // fill registers.
+  Eigen::Matrix4d places = Eigen::Matrix4d::Zero();
+  places.topRows<3>() << (centre.array() + (TensorBlock::size + 0.5)).matrix(), edges;
+  for (double x = 0.5; x < counts[0]; ++x)
+    for (double y = 0.5; y < counts[1]; ++y) {
+      const Eigen::Vector4d row(1, x / counts[0] - 0.5, y / counts[1] - 0.5, 0), start = places * row;
+      for (double z = 0.5; z < counts[2]; ++z) {
+        const double along = z / counts[2] - 0.5;
+        const Eigen::Array4i index = (start + along * places.col(3)).cast<int>().array() - TensorBlock::size;
+        if (static_cast<unsigned>(index[0] | index[1] | index[2]) >= TensorBlock::size) continue;
+        const auto offset = static_cast<std::size_t>(TensorBlock::offset(index[0], index[1], index[2]));
+        Eigen::Matrix4d& moments = work.moments[offset];
+        if (moments(0, 0) == 0) work.sampled.push_back(offset);
+        const Eigen::Vector4d coordinates = row + along * Eigen::Vector4d::UnitW();
+        moments.noalias() += coordinates * coordinates.transpose();
+      }
+    }
+}
+
+/// Adds samples of a part to the averages of the voxels of the block that they are in.
 void add_samples(const MeshSource& source, Workspace& work, const AveragedCell& cell, const TensorBlock& block,
                  const VoxelSet& voxels, const CellPart& part) {
   const SamplingLattice& lattice = source.lattice;
-  const Tensor tensor = tensor_in(source, work.cell, cell.id, part.weights);
-  const Eigen::Matrix<double, 9, 3> changes = changes_in(source, work.cell, part);
-  if (!tensor.allFinite() || !changes.allFinite()) return;
+  const Eigen::Matrix<double, 9, 4> tensors = tensors_in(source, work.cell, cell.id, part);
+  if (!tensors.allFinite()) return;
   const Vector3d centre = (part.position - lattice.position(block.origin)).cwiseQuotient(lattice.voxel);
   const Eigen::Matrix3d edges = lattice.voxel.cwiseInverse().asDiagonal() * part.edges;
   const Eigen::Array3d counts = sample_counts(centre, edges, cell.samples_along_voxel);
   const double weight = part.volume / lattice.voxel.prod() / counts.prod();
-  for (double x = 0.5; x < counts[0]; ++x)
-    for (double y = 0.5; y < counts[1]; ++y)
-      for (double z = 0.5; z < counts[2]; ++z) {
-        const Vector3d along = (Eigen::Array3d(x, y, z) / counts - 0.5).matrix();
-        const Eigen::Array3d position = (centre + edges * along).array();
-        const Eigen::Array3d index = (position + 0.5).floor();
-        if (!(index >= 0).all() || !(index < TensorBlock::size).all()) continue;
-        const auto offset = static_cast<std::size_t>(
-            TensorBlock::offset(static_cast<int>(index.x()), static_cast<int>(index.y()), static_cast<int>(index.z())));
-        if (!voxels[offset] || (source.layers && source.layers[cell.id] != work.layer[offset])) continue;
-        work.averages[offset].add((position - index).matrix(), weight, tensor + changes * along);
-        work.fineness[offset] = std::max(work.fineness[offset], cell.fineness);
-      }
+  sum_moments(centre, edges, counts, work);
+  for (const std::size_t offset : work.sampled) {
+    if (voxels[offset] && (!source.layers || source.layers[cell.id] == work.layer[offset])) {
+      Eigen::Matrix<double, 3, 4> positions;
+      positions << centre - TensorBlock::position(static_cast<int>(offset)).cast<double>(), edges;
+      work.averages[offset].add(positions, tensors, weight * work.moments[offset]);
+      work.fineness[offset] = std::max(work.fineness[offset], cell.fineness);
+    }
+    work.moments[offset].setZero();
+  }
+  work.sampled.clear();
 }
 
 /// Adds the part of the cell that is in `voxels` of the block to their averages.

@@ -12,14 +12,19 @@ class VoxelAverage {
  public:
   using Tensor = Eigen::Matrix<double, 9, 1>;
 
-  /// @param weight  The volume of which the sample is the value; > 0.
-  void add(const Eigen::Vector3d& position, double weight, const Tensor& tensor) {
-    weight_ += weight;
-    first_ += weight * position;
-    second_.noalias() += (weight * position) * position.transpose();
-    sum_ += weight * tensor;
-    mixed_.noalias() += (weight * tensor) * position.transpose();
-    squares_ += weight * tensor.squaredNorm();
+  /// Adds samples of a linear function: at coordinates c = (1, c₁, c₂, c₃), the position is `position` c, and the
+  /// tensor `tensor` c.
+  /// @param moments  Σ w c cᵀ over the samples, where w > 0 is the volume of which a sample is the value.
+  void add(const Eigen::Matrix<double, 3, 4>& position, const Eigen::Matrix<double, 9, 4>& tensor,
+           const Eigen::Matrix4d& moments) {
+    const Eigen::Matrix<double, 3, 4> positions = position * moments;
+    const Eigen::Matrix<double, 9, 4> tensors = tensor * moments;
+    weight_ += moments(0, 0);
+    first_ += positions.col(0);
+    second_.noalias() += positions * position.transpose();
+    sum_ += tensors.col(0);
+    mixed_.noalias() += tensors * position.transpose();
+    squares_ += tensors.cwiseProduct(tensor).sum();
   }
 
   bool empty() const { return weight_ == 0; }
