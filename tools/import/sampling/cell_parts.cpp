@@ -68,7 +68,8 @@ class Divider {
         powers_(powers(shape_)),
         longest_(cell.shape() == Shape::box && cell.is_linear() ? 1.0 * longest : 0.5 * longest),
         where_(where),
-        visit_(visit) {}
+        visit_(visit),
+        weights_(4, cell.points()) {}
 
   void divide(const Piece& piece) {
     Array3d centre;
@@ -109,7 +110,10 @@ class Divider {
     // The Jacobian of VTK's collapsed pyramids has the density in itself.
     if (shape_ == Shape::collapsed_pyramid) volume /= (1 - centre[2]) * (1 - centre[2]);
     volume *= std::abs(cell_.jacobian().determinant());
-    if (volume > 0) visit_({cell_.position(), volume, edges, cell_.weights(), cell_.derivatives() * tangents});
+    if (!(volume > 0)) return;
+    weights_.row(0) = Eigen::Map<const Eigen::RowVectorXd>(cell_.weights().data(), weights_.cols());
+    weights_.bottomRows<3>().noalias() = tangents.transpose() * cell_.derivatives().transpose();
+    visit_({cell_.position(), volume, edges, weights_});
   }
 
   MeshCell& cell_;
@@ -119,6 +123,7 @@ class Divider {
   Vector3d longest_;
   const Eigen::AlignedBox3d& where_;
   const std::function<void(const CellPart&)>& visit_;
+  Eigen::Matrix4Xd weights_;
 };
 
 }  // namespace

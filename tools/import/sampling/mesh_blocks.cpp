@@ -198,13 +198,12 @@ AlignedBox3d box_of(const MeshSource& source, const TensorBlock& block, const Vo
 }
 
 /// The tensor at the centroid of a part of `cell`, and its changes along the part's edges.
-Eigen::Matrix<double, 9, 4> tensors_in(const MeshSource& source, const MeshCell& cell, vtkIdType id,
-                                       const CellPart& part) {
-  Eigen::Matrix<double, 9, 4> sum = Eigen::Matrix<double, 9, 4>::Zero();
-  sum.col(0) = tensor_in(source, cell, id, part.weights);
+VoxelAverage::Linear tensors_in(const MeshSource& source, const MeshCell& cell, vtkIdType id, const CellPart& part) {
+  using Given = Eigen::Map<const Eigen::Matrix<double, 1, 9>>;
+  VoxelAverage::Linear sum = VoxelAverage::Linear::Zero();
+  if (!source.point_tensors) sum.row(0) = Given(source.cell_tensors + 9 * id);
   for (int i = 0; source.point_tensors && i < cell.points(); ++i)
-    sum.rightCols<3>().noalias() +=
-        Eigen::Map<const Tensor>(source.point_tensors + 9 * cell.point(i)) * part.changes.row(i);
+    sum.noalias() += part.weights.col(i) * Given(source.point_tensors + 9 * cell.point(i));
   return sum;
 }
 
@@ -224,20 +223,18 @@ Eigen::Array3d sample_counts(const Vector3d& centre, const Eigen::Matrix3d& edge
 }
 
 /// Sums moments of samples of a part, evenly spaced along its edges, in the voxels of a block that they are in.
-/// @param centre, edges  From the block's first voxel, in voxels.
-void sum_moments(const Vector3d& centre, const Eigen::Matrix3d& edges, const Eigen::Array3d& counts, Workspace& work) {
-  // Places count voxels from the corner of the block before, so that rounding towards zero is down. Vectors of four
-  // fill registers.
-  Eigen::Matrix4d places = Eigen::Matrix4d::Zero();
-  places.topRows<3>() << (centre.array() + (TensorBlock::size + 0.5)).matrix(), edges;
+/// @param place  Times (1, coordinates along the edges): (1, the position from the block's first voxel, in voxels).
+void sum_moments(Eigen::Matrix4d place, const Eigen::Array3d& counts, Workspace& work) {
+  // Counted from the corner of the block before, so that rounding towards zero is down.
+  place.col(0).tail<3>().array() += TensorBlock::size + 0.5;
   for (double x = 0.5; x < counts[0]; ++x)
     for (double y = 0.5; y < counts[1]; ++y) {
-      const Eigen::Vector4d row(1, x / counts[0] - 0.5, y / counts[1] - 0.5, 0), start = places * row;
+      const Eigen::Vector4d row(1, x / counts[0] - 0.5, y / counts[1] - 0.5, 0), start = place * row;
       for (double z = 0.5; z < counts[2]; ++z) {
         const double along = z / counts[2] - 0.5;
-        const Eigen::Array4i index = (start + along * places.col(3)).cast<int>().array() - TensorBlock::size;
-        if (static_cast<unsigned>(index[0] | index[1] | index[2]) >= TensorBlock::size) continue;
-        const auto offset = static_cast<std::size_t>(TensorBlock::offset(index[0], index[1], index[2]));
+        const Eigen::Array4i index = (start + along * place.col(3)).cast<int>().array() - TensorBlock::size;
+        if (static_cast<unsigned>(index[1] | index[2] | index[3]) >= TensorBlock::size) continue;
+        const auto offset = static_cast<std::size_t>(TensorBlock::offset(index[1], index[2], index[3]));
         Eigen::Matrix4d& moments = work.moments[offset];
         if (moments(0, 0) == 0) work.sampled.push_back(offset);
         const Eigen::Vector4d coordinates = row + along * Eigen::Vector4d::UnitW();
@@ -250,18 +247,20 @@ void sum_moments(const Vector3d& centre, const Eigen::Matrix3d& edges, const Eig
 void add_samples(const MeshSource& source, Workspace& work, const AveragedCell& cell, const TensorBlock& block,
                  const VoxelSet& voxels, const CellPart& part) {
   const SamplingLattice& lattice = source.lattice;
-  const Eigen::Matrix<double, 9, 4> tensors = tensors_in(source, work.cell, cell.id, part);
+  const VoxelAverage::Linear tensors = tensors_in(source, work.cell, cell.id, part);
   if (!tensors.allFinite()) return;
   const Vector3d centre = (part.position - lattice.position(block.origin)).cwiseQuotient(lattice.voxel);
   const Eigen::Matrix3d edges = lattice.voxel.cwiseInverse().asDiagonal() * part.edges;
   const Eigen::Array3d counts = sample_counts(centre, edges, cell.samples_along_voxel);
   const double weight = part.volume / lattice.voxel.prod() / counts.prod();
-  sum_moments(centre, edges, counts, work);
+  const Eigen::Matrix4d squares = tensors * tensors.transpose();
+  Eigen::Matrix4d place;
+  place << Eigen::RowVector4d::UnitX(), centre, edges;
+  sum_moments(place, counts, work);
   for (const std::size_t offset : work.sampled) {
     if (voxels[offset] && (!source.layers || source.layers[cell.id] == work.layer[offset])) {
-      Eigen::Matrix<double, 3, 4> positions;
-      positions << centre - TensorBlock::position(static_cast<int>(offset)).cast<double>(), edges;
-      work.averages[offset].add(positions, tensors, weight * work.moments[offset]);
+      place.col(0).tail<3>() = centre - TensorBlock::position(static_cast<int>(offset)).cast<double>();
+      work.averages[offset].add(place, tensors, squares, weight * work.moments[offset]);
       work.fineness[offset] = std::max(work.fineness[offset], cell.fineness);
     }
     work.moments[offset].setZero();
