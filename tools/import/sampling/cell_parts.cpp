@@ -27,12 +27,10 @@ std::array<int, 3> powers(Shape shape) {
   return {0, 0, shape == Shape::collapsed_pyramid || shape == Shape::pyramid ? 2 : 0};
 }
 
+double power(double x, int exponent) { return exponent == 0 ? 1 : x * power(x, exponent - 1); }
+
 /// ∫ (1 − c)^k dc over an interval.
-double mass(int k, double from, double to) {
-  double near = 1 - from, far = 1 - to;
-  for (int i = 0; i < k; ++i) near *= 1 - from, far *= 1 - to;
-  return (near - far) / (k + 1);
-}
+double mass(int k, double from, double to) { return (power(1 - from, k + 1) - power(1 - to, k + 1)) / (k + 1); }
 
 /// The mean of c over the interval with the density (1 − c)^k.
 double mean(int k, double from, double to) {
@@ -83,15 +81,13 @@ class Divider {
     cell_.evaluate(parametric(shape_, centre, tangents), part_);
     tangents *= (piece.to - piece.from).matrix().asDiagonal();
     const Matrix3d edges = cell_.jacobian() * tangents;
-    const Vector3d reach = 0.5 * edges.cwiseAbs().rowwise().sum();
-    // Twice as far as an affine piece reaches, because edges that are not parallel differ in length.
-    if (is_outside(2 * reach)) return;
     const Eigen::RowVector3d lengths = (longest_.cwiseInverse().asDiagonal() * edges).colwise().norm();
     Eigen::Index axis = 0;
-    if (!(lengths.maxCoeff(&axis) > rounded_one)) {
-      if (!is_outside(reach)) visit_part(volume, centre, edges, tangents);
-      return;
-    }
+    const bool is_part = !(lengths.maxCoeff(&axis) > rounded_one);
+    // A part is affine. A larger piece may reach twice as far, because edges that are not parallel differ in length.
+    const Vector3d reach = (is_part ? 0.5 : 1.0) * edges.cwiseAbs().rowwise().sum();
+    if (!where_.intersects(Eigen::AlignedBox3d(cell_.position() - reach, cell_.position() + reach))) return;
+    if (is_part) return visit_part(volume, centre, edges, tangents);
     Piece first = piece, second = piece;
     first.to[axis] = second.from[axis] = 0.5 * (piece.from[axis] + piece.to[axis]);
     divide(first);
@@ -101,19 +97,14 @@ class Divider {
  private:
   static constexpr double rounded_one = 1 + 1e-6;
 
-  bool is_outside(const Vector3d& reach) const {
-    return !where_.intersects(Eigen::AlignedBox3d(cell_.position() - reach, cell_.position() + reach));
-  }
-
   void visit_part(double volume, const Array3d& centre, const Matrix3d& edges, const Matrix3d& tangents) {
     if (shape_ == Shape::pyramid) volume *= 0.5;  // Its height.
     // The Jacobian of VTK's collapsed pyramids has the density in itself.
     if (shape_ == Shape::collapsed_pyramid) volume /= (1 - centre[2]) * (1 - centre[2]);
     volume *= std::abs(cell_.jacobian().determinant());
-    if (!(volume > 0)) return;
     weights_.row(0) = Eigen::Map<const Eigen::RowVectorXd>(cell_.weights().data(), weights_.cols());
     weights_.bottomRows<3>().noalias() = tangents.transpose() * cell_.derivatives().transpose();
-    visit_({cell_.position(), volume, edges, weights_});
+    if (volume > 0) visit_({cell_.position(), volume, edges, weights_});
   }
 
   MeshCell& cell_;
