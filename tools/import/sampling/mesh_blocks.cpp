@@ -268,37 +268,17 @@ void add_samples(const MeshSource& source, Workspace& work, const AveragedCell& 
   work.sampled.clear();
 }
 
-/// Adds the part of the cell that is in `voxels` of the block to their averages.
-void add_parts(const MeshSource& source, Workspace& work, const AveragedCell& cell, const TensorBlock& block,
-               const VoxelSet& voxels, const AlignedBox3d& where) {
-  visit_parts(work.cell, source.lattice.voxel, where,
-              [&](const CellPart& part) { add_samples(source, work, cell, block, voxels, part); });
-}
-
-/// Adds the cells that are thinner than voxels. @return the voxels that have some.
-VoxelSet add_fine_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
-                        const TensorBlock& block) {
-  const AlignedBox3d where = box_of(source, block, block.active);
-  for (const vtkIdType* id = begin; id != end; ++id) {
-    if (!may_be_fine(source, *id) || !source.solid.boxes[static_cast<std::size_t>(*id)].intersects(where)) continue;
-    if (!load(source, work.cell, *id)) continue;
-    const AveragedCell cell = averaged_cell(work.cell, *id, source.lattice.voxel);
-    if (cell.fineness > 0) add_parts(source, work, cell, block, block.active, where);
-  }
-  VoxelSet voxels;
-  for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) voxels[offset] = !work.averages[offset].empty();
-  return voxels;
-}
-
-/// Adds the other cells, in voxels that have some thin ones.
-void add_coarse_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
-                      const TensorBlock& block, const VoxelSet& voxels) {
+/// Adds the parts in `voxels` of the block of cells that are thinner than voxels, or of the others.
+void add_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
+               const TensorBlock& block, const VoxelSet& voxels, bool is_fine) {
   const AlignedBox3d where = box_of(source, block, voxels);
   for (const vtkIdType* id = begin; id != end; ++id) {
     const AlignedBox3d& box = source.solid.boxes[static_cast<std::size_t>(*id)];
-    if (!box.intersects(where) || !load(source, work.cell, *id)) continue;
+    if ((is_fine && !may_be_fine(source, *id)) || !box.intersects(where) || !load(source, work.cell, *id)) continue;
     const AveragedCell cell = averaged_cell(work.cell, *id, source.lattice.voxel);
-    if (cell.fineness == 0) add_parts(source, work, cell, block, voxels, where.intersection(box));
+    if ((cell.fineness > 0) == is_fine)
+      visit_parts(work.cell, source.lattice.voxel, where.intersection(box),
+                  [&](const CellPart& part) { add_samples(source, work, cell, block, voxels, part); });
   }
 }
 
@@ -306,9 +286,11 @@ void add_coarse_cells(const MeshSource& source, const vtkIdType* begin, const vt
 void average_voxels(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
                     TensorBlock& block) {
   if (std::none_of(begin, end, [&](vtkIdType id) { return may_be_fine(source, id); })) return;
-  const VoxelSet voxels = add_fine_cells(source, begin, end, work, block);
+  add_cells(source, begin, end, work, block, block.active, true);
+  VoxelSet voxels;
+  for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) voxels[offset] = !work.averages[offset].empty();
   if (voxels.none()) return;
-  add_coarse_cells(source, begin, end, work, block, voxels);
+  add_cells(source, begin, end, work, block, voxels, false);
   for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) {
     if (!voxels[offset]) continue;
     const auto part = static_cast<float>(work.fineness[offset]);
