@@ -497,11 +497,11 @@ TEST_P(EveryCellType, PartsHaveItsVolumeAndCentroid) {
     double sum = 0;
     visit_parts(cell, Vector3d::Constant(longest), all, [&](const CellPart& part) {
       Vector3d position = Vector3d::Zero();
-      for (int i = 0; i < cell.points(); ++i)
-        position += part.weights[static_cast<std::size_t>(i)] * cell.positions().col(i);
+      for (int i = 0; i < cell.points(); ++i) position += part.weights(0, i) * cell.positions().col(i);
       EXPECT_LT((position - part.position).norm(), 1e-5);
       Eigen::Matrix3d edges = Eigen::Matrix3d::Zero();
-      for (int i = 0; i < cell.points(); ++i) edges += cell.positions().col(i) * part.changes.row(i);
+      for (int i = 0; i < cell.points(); ++i)
+        edges += cell.positions().col(i) * part.weights.col(i).tail<3>().transpose();
       EXPECT_LT((edges - part.edges).norm(), 1e-5);
       sum += part.volume;
     });

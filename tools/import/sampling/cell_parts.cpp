@@ -27,8 +27,10 @@ std::array<int, 3> powers(Shape shape) {
   return {0, 0, shape == Shape::collapsed_pyramid || shape == Shape::pyramid ? 2 : 0};
 }
 
+double power(double x, int exponent) { return exponent == 0 ? 1 : x * power(x, exponent - 1); }
+
 /// ∫ (1 − c)^k dc over an interval.
-double mass(int k, double from, double to) { return (std::pow(1 - from, k + 1) - std::pow(1 - to, k + 1)) / (k + 1); }
+double mass(int k, double from, double to) { return (power(1 - from, k + 1) - power(1 - to, k + 1)) / (k + 1); }
 
 /// The mean of c over the interval with the density (1 − c)^k.
 double mean(int k, double from, double to) {
@@ -64,7 +66,8 @@ class Divider {
         powers_(powers(shape_)),
         longest_(cell.shape() == Shape::box && cell.is_linear() ? 1.0 * longest : 0.5 * longest),
         where_(where),
-        visit_(visit) {}
+        visit_(visit),
+        weights_(4, cell.points()) {}
 
   void divide(const Piece& piece) {
     Array3d centre;
@@ -78,12 +81,13 @@ class Divider {
     cell_.evaluate(parametric(shape_, centre, tangents), part_);
     tangents *= (piece.to - piece.from).matrix().asDiagonal();
     const Matrix3d edges = cell_.jacobian() * tangents;
-    // Twice as far as an affine piece reaches, because edges that are not parallel differ in length.
-    const Vector3d reach = edges.cwiseAbs().rowwise().sum();
-    if (!where_.intersects(Eigen::AlignedBox3d(cell_.position() - reach, cell_.position() + reach))) return;
     const Eigen::RowVector3d lengths = (longest_.cwiseInverse().asDiagonal() * edges).colwise().norm();
     Eigen::Index axis = 0;
-    if (!(lengths.maxCoeff(&axis) > rounded_one)) return visit_part(volume, centre, edges, tangents);
+    const bool is_part = !(lengths.maxCoeff(&axis) > rounded_one);
+    // A part is affine. A larger piece may reach twice as far, because edges that are not parallel differ in length.
+    const Vector3d reach = (is_part ? 0.5 : 1.0) * edges.cwiseAbs().rowwise().sum();
+    if (!where_.intersects(Eigen::AlignedBox3d(cell_.position() - reach, cell_.position() + reach))) return;
+    if (is_part) return visit_part(volume, centre, edges, tangents);
     Piece first = piece, second = piece;
     first.to[axis] = second.from[axis] = 0.5 * (piece.from[axis] + piece.to[axis]);
     divide(first);
@@ -98,7 +102,9 @@ class Divider {
     // The Jacobian of VTK's collapsed pyramids has the density in itself.
     if (shape_ == Shape::collapsed_pyramid) volume /= (1 - centre[2]) * (1 - centre[2]);
     volume *= std::abs(cell_.jacobian().determinant());
-    if (volume > 0) visit_({cell_.position(), volume, edges, cell_.weights(), cell_.derivatives() * tangents});
+    weights_.row(0) = Eigen::Map<const Eigen::RowVectorXd>(cell_.weights().data(), weights_.cols());
+    weights_.bottomRows<3>().noalias() = tangents.transpose() * cell_.derivatives().transpose();
+    if (volume > 0) visit_({cell_.position(), volume, edges, weights_});
   }
 
   MeshCell& cell_;
@@ -108,6 +114,7 @@ class Divider {
   Vector3d longest_;
   const Eigen::AlignedBox3d& where_;
   const std::function<void(const CellPart&)>& visit_;
+  Eigen::Matrix4Xd weights_;
 };
 
 }  // namespace

@@ -15,9 +15,9 @@ struct CellPart {
   Eigen::Vector3d position;  ///< Its centroid, exactly so where the cell is affine.
   double volume;             ///< > 0, also of cells that are inside out.
   Eigen::Matrix3d edges;     ///< As columns.
-  /// Of the cell's points, at `position`: the weights, and their changes along the edges, as columns.
-  const std::vector<double>& weights;
-  Eigen::MatrixX3d changes;
+  /// Of the cell's points, as columns: the weight at `position`, and its changes along the edges. Valid until the next
+  /// part.
+  const Eigen::Matrix4Xd& weights;
 };
 
 /// Calls `visit` for parts of `cell` that cover it and whose edges are at most `longest` along each axis, except for

@@ -110,6 +110,9 @@ bool load(const MeshSource& source, MeshCell& cell, vtkIdType id) {
 struct Workspace {
   MeshCell cell;
   std::vector<VoxelAverage> averages = std::vector<VoxelAverage>(TensorBlock::voxels);
+  /// Of samples of a part, in each voxel: Σ c cᵀ over c = (1, coordinates along its edges in [−1/2, 1/2]).
+  std::vector<Eigen::Matrix4d> moments = std::vector<Eigen::Matrix4d>(TensorBlock::voxels, Eigen::Matrix4d::Zero());
+  std::vector<std::size_t> sampled;                    ///< The voxels that have some.
   std::array<double, TensorBlock::voxels> fineness{};  ///< Of the finest cell in each voxel.
   std::array<int, TensorBlock::voxels> layer{};        ///< From which each voxel has its value.
 };
@@ -194,12 +197,13 @@ AlignedBox3d box_of(const MeshSource& source, const TensorBlock& block, const Vo
   return {lattice.position(box.min()) - 0.5 * lattice.voxel, lattice.position(box.max()) + 0.5 * lattice.voxel};
 }
 
-/// The change of the tensor along the edges of a part of `cell`.
-Eigen::Matrix<double, 9, 3> changes_in(const MeshSource& source, const MeshCell& cell, const CellPart& part) {
-  Eigen::Matrix<double, 9, 3> sum = Eigen::Matrix<double, 9, 3>::Zero();
-  if (!source.point_tensors) return sum;
-  for (int i = 0; i < cell.points(); ++i)
-    sum.noalias() += Eigen::Map<const Tensor>(source.point_tensors + 9 * cell.point(i)) * part.changes.row(i);
+/// The tensor at the centroid of a part of `cell`, and its changes along the part's edges.
+VoxelAverage::Linear tensors_in(const MeshSource& source, const MeshCell& cell, vtkIdType id, const CellPart& part) {
+  using Given = Eigen::Map<const Eigen::Matrix<double, 1, 9>>;
+  VoxelAverage::Linear sum = VoxelAverage::Linear::Zero();
+  if (!source.point_tensors) sum.row(0) = Given(source.cell_tensors + 9 * id);
+  for (int i = 0; source.point_tensors && i < cell.points(); ++i)
+    sum.noalias() += part.weights.col(i) * Given(source.point_tensors + 9 * cell.point(i));
   return sum;
 }
 
@@ -218,63 +222,63 @@ Eigen::Array3d sample_counts(const Vector3d& centre, const Eigen::Matrix3d& edge
   return counts;
 }
 
-/// Adds samples of a part, evenly spaced along its edges, to the averages of the voxels of the block that they are in.
+/// Sums moments of samples of a part, evenly spaced along its edges, in the voxels of a block that they are in.
+/// @param place  Times (1, coordinates along the edges): (1, the position from the block's first voxel, in voxels).
+void sum_moments(Eigen::Matrix4d place, const Eigen::Array3d& counts, Workspace& work) {
+  // Counted from the corner of the block before, so that rounding towards zero is down.
+  place.col(0).tail<3>().array() += TensorBlock::size + 0.5;
+  for (double x = 0.5; x < counts[0]; ++x)
+    for (double y = 0.5; y < counts[1]; ++y) {
+      const Eigen::Vector4d row(1, x / counts[0] - 0.5, y / counts[1] - 0.5, 0), start = place * row;
+      for (double z = 0.5; z < counts[2]; ++z) {
+        const double along = z / counts[2] - 0.5;
+        const Eigen::Array4i index = (start + along * place.col(3)).cast<int>().array() - TensorBlock::size;
+        if (static_cast<unsigned>(index[1] | index[2] | index[3]) >= TensorBlock::size) continue;
+        const auto offset = static_cast<std::size_t>(TensorBlock::offset(index[1], index[2], index[3]));
+        Eigen::Matrix4d& moments = work.moments[offset];
+        if (moments(0, 0) == 0) work.sampled.push_back(offset);
+        const Eigen::Vector4d coordinates = row + along * Eigen::Vector4d::UnitW();
+        moments.noalias() += coordinates * coordinates.transpose();
+      }
+    }
+}
+
+/// Adds samples of a part to the averages of the voxels of the block that they are in.
 void add_samples(const MeshSource& source, Workspace& work, const AveragedCell& cell, const TensorBlock& block,
                  const VoxelSet& voxels, const CellPart& part) {
   const SamplingLattice& lattice = source.lattice;
-  const Tensor tensor = tensor_in(source, work.cell, cell.id, part.weights);
-  const Eigen::Matrix<double, 9, 3> changes = changes_in(source, work.cell, part);
-  if (!tensor.allFinite() || !changes.allFinite()) return;
+  const VoxelAverage::Linear tensors = tensors_in(source, work.cell, cell.id, part);
+  if (!tensors.allFinite()) return;
   const Vector3d centre = (part.position - lattice.position(block.origin)).cwiseQuotient(lattice.voxel);
   const Eigen::Matrix3d edges = lattice.voxel.cwiseInverse().asDiagonal() * part.edges;
   const Eigen::Array3d counts = sample_counts(centre, edges, cell.samples_along_voxel);
   const double weight = part.volume / lattice.voxel.prod() / counts.prod();
-  for (double x = 0.5; x < counts[0]; ++x)
-    for (double y = 0.5; y < counts[1]; ++y)
-      for (double z = 0.5; z < counts[2]; ++z) {
-        const Vector3d along = (Eigen::Array3d(x, y, z) / counts - 0.5).matrix();
-        const Eigen::Array3d position = (centre + edges * along).array();
-        const Eigen::Array3d index = (position + 0.5).floor();
-        if (!(index >= 0).all() || !(index < TensorBlock::size).all()) continue;
-        const auto offset = static_cast<std::size_t>(
-            TensorBlock::offset(static_cast<int>(index.x()), static_cast<int>(index.y()), static_cast<int>(index.z())));
-        if (!voxels[offset] || (source.layers && source.layers[cell.id] != work.layer[offset])) continue;
-        work.averages[offset].add((position - index).matrix(), weight, tensor + changes * along);
-        work.fineness[offset] = std::max(work.fineness[offset], cell.fineness);
-      }
-}
-
-/// Adds the part of the cell that is in `voxels` of the block to their averages.
-void add_parts(const MeshSource& source, Workspace& work, const AveragedCell& cell, const TensorBlock& block,
-               const VoxelSet& voxels, const AlignedBox3d& where) {
-  visit_parts(work.cell, source.lattice.voxel, where,
-              [&](const CellPart& part) { add_samples(source, work, cell, block, voxels, part); });
-}
-
-/// Adds the cells that are thinner than voxels. @return the voxels that have some.
-VoxelSet add_fine_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
-                        const TensorBlock& block) {
-  const AlignedBox3d where = box_of(source, block, block.active);
-  for (const vtkIdType* id = begin; id != end; ++id) {
-    if (!may_be_fine(source, *id) || !source.solid.boxes[static_cast<std::size_t>(*id)].intersects(where)) continue;
-    if (!load(source, work.cell, *id)) continue;
-    const AveragedCell cell = averaged_cell(work.cell, *id, source.lattice.voxel);
-    if (cell.fineness > 0) add_parts(source, work, cell, block, block.active, where);
+  const Eigen::Matrix4d squares = tensors * tensors.transpose();
+  Eigen::Matrix4d place;
+  place << Eigen::RowVector4d::UnitX(), centre, edges;
+  sum_moments(place, counts, work);
+  for (const std::size_t offset : work.sampled) {
+    if (voxels[offset] && (!source.layers || source.layers[cell.id] == work.layer[offset])) {
+      place.col(0).tail<3>() = centre - TensorBlock::position(static_cast<int>(offset)).cast<double>();
+      work.averages[offset].add(place, tensors, squares, weight * work.moments[offset]);
+      work.fineness[offset] = std::max(work.fineness[offset], cell.fineness);
+    }
+    work.moments[offset].setZero();
   }
-  VoxelSet voxels;
-  for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) voxels[offset] = !work.averages[offset].empty();
-  return voxels;
+  work.sampled.clear();
 }
 
-/// Adds the other cells, in voxels that have some thin ones.
-void add_coarse_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
-                      const TensorBlock& block, const VoxelSet& voxels) {
+/// Adds the parts in `voxels` of the block of cells that are thinner than voxels, or of the others.
+void add_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
+               const TensorBlock& block, const VoxelSet& voxels, bool is_fine) {
   const AlignedBox3d where = box_of(source, block, voxels);
   for (const vtkIdType* id = begin; id != end; ++id) {
     const AlignedBox3d& box = source.solid.boxes[static_cast<std::size_t>(*id)];
-    if (!box.intersects(where) || !load(source, work.cell, *id)) continue;
+    if ((is_fine && !may_be_fine(source, *id)) || !box.intersects(where) || !load(source, work.cell, *id)) continue;
     const AveragedCell cell = averaged_cell(work.cell, *id, source.lattice.voxel);
-    if (cell.fineness == 0) add_parts(source, work, cell, block, voxels, where.intersection(box));
+    if ((cell.fineness > 0) == is_fine)
+      visit_parts(work.cell, source.lattice.voxel, where.intersection(box),
+                  [&](const CellPart& part) { add_samples(source, work, cell, block, voxels, part); });
   }
 }
 
@@ -282,9 +286,11 @@ void add_coarse_cells(const MeshSource& source, const vtkIdType* begin, const vt
 void average_voxels(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
                     TensorBlock& block) {
   if (std::none_of(begin, end, [&](vtkIdType id) { return may_be_fine(source, id); })) return;
-  const VoxelSet voxels = add_fine_cells(source, begin, end, work, block);
+  add_cells(source, begin, end, work, block, block.active, true);
+  VoxelSet voxels;
+  for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) voxels[offset] = !work.averages[offset].empty();
   if (voxels.none()) return;
-  add_coarse_cells(source, begin, end, work, block, voxels);
+  add_cells(source, begin, end, work, block, voxels, false);
   for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) {
     if (!voxels[offset]) continue;
     const auto part = static_cast<float>(work.fineness[offset]);

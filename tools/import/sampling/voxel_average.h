@@ -12,17 +12,21 @@ class VoxelAverage {
  public:
   using Tensor = Eigen::Matrix<double, 9, 1>;
 
-  /// @param weight  The volume of which the sample is the value; > 0.
-  void add(const Eigen::Vector3d& position, double weight, const Tensor& tensor) {
-    weight_ += weight;
-    first_ += weight * position;
-    second_.noalias() += (weight * position) * position.transpose();
-    sum_ += weight * tensor;
-    mixed_.noalias() += (weight * tensor) * position.transpose();
-    squares_ += weight * tensor.squaredNorm();
+  /// Tensors that are linear in coordinates c = (1, c₁, c₂, c₃), as a row for each of these.
+  using Linear = Eigen::Matrix<double, 4, 9>;
+
+  /// Adds samples at positions (1, p) = `place` c with the tensors `linear`ᵀ c.
+  /// @param squares  `linear` `linear`ᵀ.
+  /// @param moments  Σ w c cᵀ over the samples, where w > 0 is the volume of which a sample is the value.
+  void add(const Eigen::Matrix4d& place, const Linear& linear, const Eigen::Matrix4d& squares,
+           const Eigen::Matrix4d& moments) {
+    const Eigen::Matrix4d placed = place * moments;
+    positions_.noalias() += placed * place.transpose();
+    tensors_.noalias() += placed * linear;
+    squares_ += squares.cwiseProduct(moments).sum();
   }
 
-  bool empty() const { return weight_ == 0; }
+  bool empty() const { return positions_(0, 0) == 0; }
 
   /// The average, corrected for samples that are not centred in the voxel: because the body fills the voxel in part,
   /// or because samples belong to one voxel as wholes. A linear function is fitted by least squares, and what it
@@ -34,24 +38,25 @@ class VoxelAverage {
     // Of a voxel that is filled the variance of positions is 1/12. Less than this is none: samples on a plane or a
     // line.
     constexpr double no_variance = 1e-9;
-    const Eigen::Vector3d centroid = first_ / weight_;
-    const Tensor average = sum_ / weight_;
-    Eigen::Matrix3d variance = second_ / weight_ - centroid * centroid.transpose();
+    const double weight = positions_(0, 0);
+    const Eigen::Vector3d centroid = positions_.col(0).tail<3>() / weight;
+    const Tensor average = tensors_.row(0).transpose() / weight;
+    Eigen::Matrix3d variance = positions_.bottomRightCorner<3, 3>() / weight - centroid * centroid.transpose();
     variance.diagonal().array() += no_variance;
-    const Eigen::Matrix<double, 9, 3> covariance = mixed_ / weight_ - average * centroid.transpose();
+    const Eigen::Matrix<double, 9, 3> covariance =
+        tensors_.bottomRows<3>().transpose() / weight - average * centroid.transpose();
     const Eigen::Matrix<double, 9, 3> gradient = variance.ldlt().solve(covariance.transpose()).transpose();
-    const double all = squares_ / weight_ - average.squaredNorm();
+    const double all = squares_ / weight - average.squaredNorm();
     const double explained = gradient.cwiseProduct(covariance).sum();
     const double fraction = all > 0 ? std::clamp(4 * explained / all - 3, 0.0, 1.0) : 0.0;
     return average - fraction * gradient * centroid;
   }
 
  private:
-  double weight_ = 0, squares_ = 0;
-  Eigen::Vector3d first_ = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d second_ = Eigen::Matrix3d::Zero();
-  Tensor sum_ = Tensor::Zero();
-  Eigen::Matrix<double, 9, 3> mixed_ = Eigen::Matrix<double, 9, 3>::Zero();
+  // Sums of w (1, p) (1, p)ᵀ, of w (1, p) Tᵀ, and of w ‖T‖². Columns of four fill registers.
+  Eigen::Matrix4d positions_ = Eigen::Matrix4d::Zero();
+  Linear tensors_ = Linear::Zero();
+  double squares_ = 0;
 };
 
 }  // namespace tensorray
