@@ -116,7 +116,9 @@ LensPoint make_point(const LensView& view, const Vector2d& pixel, const FlowPoin
   return point;
 }
 
-void draw_tile(const LensView& view, int tile, LensPicture& picture, TraceCounts& counts) {
+/// @param obstacles  That the picture shows, if any.
+void draw_tile(const LensView& view, int tile, const std::optional<Geometry>& obstacles, LensPicture& picture,
+               TraceCounts& counts) {
   const Eigen::AlignedBox2i box = view.flow.pixels(tile);
   const int columns = box.sizes().x() + 1, rows = box.sizes().y() + 1;
   const std::size_t reference = view.reference;
@@ -131,10 +133,18 @@ void draw_tile(const LensView& view, int tile, LensPicture& picture, TraceCounts
       shader.shade(x, y, light);
       const Eigen::Vector2i at = box.min() + Eigen::Vector2i(x, y);
       const auto pixel = static_cast<std::size_t>(at.y()) * picture.color.width + at.x();
-      for (int c = 0; c < 3; ++c) picture.color.plane(c)[pixel] = light.color[c];
+      const double alpha = *std::max_element(light.alpha.begin(), light.alpha.end());
+      Eigen::Vector4d seen;
+      seen << light.color, std::min(alpha, 1.0);  // Rounding may make the sum greater than 1.
+      if (obstacles) {
+        Eigen::Vector4f covered = seen.cast<float>();
+        draw_obstacles(*obstacles, view.light.setup, view.light.settings.samples, at, covered);
+        seen = covered.cast<double>();
+      }
+      for (int c = 0; c < 3; ++c) picture.color.plane(c)[pixel] = seen[c];
+      picture.alpha[pixel] = seen[3];
       for (int c = 0; c < picture.radiance.channels; ++c)
         picture.radiance.plane(c)[pixel] = light.channels[static_cast<std::size_t>(c)];
-      picture.alpha[pixel] = *std::max_element(light.alpha.begin(), light.alpha.end());
       picture.points[pixel] = make_point(view, at.cast<double>() + Vector2d(0.5, 0.5),
                                          centers[reference][static_cast<std::size_t>(y * columns + x)]);
     }
@@ -285,11 +295,13 @@ LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands
   picture.straight.translation() = texture_coordinates(light, light.straight.translation());
 
   const LensView view = make_lens_view(light, bands, radiance);
+  std::optional<Geometry> obstacles;
+  if (const Surfaces* shown = light.settings.obstacles) obstacles.emplace(obstacles_of(*shown));
   std::vector<TraceCounts> counts(static_cast<std::size_t>(view.flow.tiles()));
   Units tiles;
   tiles.count = counts.size();
   tiles.round = FlowView::tiles_at_once;
-  tiles.make = [&](std::size_t tile) { draw_tile(view, static_cast<int>(tile), picture, counts[tile]); };
+  tiles.make = [&](std::size_t tile) { draw_tile(view, static_cast<int>(tile), obstacles, picture, counts[tile]); };
   tiles.copy = [&](std::size_t tile, Archive& archive) { copy_tile(view, static_cast<int>(tile), picture, archive); };
   make_units(tiles, light.settings.job, "drawing the picture", progress);
   if (gathers(light) && is_root(light.settings.job ? light.settings.job->ranks : nullptr)) count_places(view, picture);
@@ -299,22 +311,21 @@ LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands
   return picture;
 }
 
-void draw_obstacles(const Surfaces& surfaces, const LensSetup& setup, int samples, Image& image) {
-  const Geometry obstacles({surfaces.bounds, std::nullopt, std::nullopt, surfaces.obstacles});
-  tbb::parallel_for(0, image.height, [&](int y) {
-    for (int x = 0; x < image.width; ++x) {
-      float* pixel = image.pixel(x, y);
-      const float open = 1 - pixel[3];
-      if (!(open > 0)) continue;
-      Eigen::Vector2d seen(0, 0);
-      for (int i = 0; i < samples * samples; ++i)
-        seen += see_obstacle(obstacles, setup,
-                             Eigen::Vector2d(x, y) + Eigen::Vector2d(i % samples + 0.5, i / samples + 0.5) / samples);
-      const Eigen::Vector2f added = open * (seen / (samples * samples)).cast<float>();
-      for (int c = 0; c < 3; ++c) pixel[c] += added[0];
-      pixel[3] = std::min(pixel[3] + added[1], 1.0f);
-    }
-  });
+Geometry obstacles_of(const Surfaces& surfaces) {
+  return Geometry({surfaces.bounds, std::nullopt, std::nullopt, surfaces.obstacles});
+}
+
+void draw_obstacles(const Geometry& obstacles, const LensSetup& setup, int samples, const Eigen::Vector2i& at,
+                    Eigen::Vector4f& pixel) {
+  const float open = 1 - pixel[3];
+  if (!(open > 0)) return;
+  Vector2d seen(0, 0);
+  for (int i = 0; i < samples * samples; ++i)
+    seen +=
+        see_obstacle(obstacles, setup, at.cast<double>() + Vector2d(i % samples + 0.5, i / samples + 0.5) / samples);
+  const Eigen::Vector2f added = open * (seen / (samples * samples)).cast<float>();
+  pixel.head<3>().array() += added[0];
+  pixel[3] = std::min(pixel[3] + added[1], 1.0f);
 }
 
 }  // namespace tensorray

@@ -122,6 +122,8 @@ struct LensSettings {
   std::vector<double> flexibilities;
   bool range = false;
 
+  const Surfaces* obstacles = nullptr;  ///< Whose obstacles the picture shows where it is transparent; null: none.
+
   Job* job = nullptr;  ///< As FlowSettings has it; its ranks draw the light together, too. That of a shard cannot be
                        ///< drawn.
 
@@ -154,10 +156,10 @@ struct LensPoint {
 
 struct LensPicture {
   Film color;                     ///< Red, green and blue, multiplied by alpha.
-  Film radiance;                  ///< If asked for: one plane for each channel, multiplied by alpha.
+  Film radiance;                  ///< If asked for: one plane for each channel, multiplied by alpha; without obstacles.
   std::vector<double> alpha;      ///< One value for each pixel: the part of it that sees the image, in the band that
-                                  ///< sees most of it. Where other bands do not see the image, their light is missing,
-                                  ///< and the remaining light is coloured.
+                                  ///< sees most of it, or an obstacle. Where other bands do not see the image, their
+                                  ///< light is missing, and the remaining light is coloured.
   std::vector<LensPoint> points;  ///< One for each pixel, row by row from the top.
   Eigen::Affine2d straight = Eigen::Affine2d::Identity();  ///< Maps pixels to the (s, t) that straight light shows.
   std::vector<EndCounts> ends;  ///< Number of vertices of the map by channel and end; `plate` counts light that met
@@ -199,11 +201,13 @@ LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const B
 LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance,
                       std::size_t channels, bool by_channel, const Progress& progress);
 
-/// Adds the obstacles between the receiver and the plane of the image to a picture with the receiver's resolution,
-/// where its alpha is less than 1: as the viewer sees them along straight lines, in light from there.
-/// @param surfaces  Their obstacles are drawn. @param samples  Of a pixel along x and along y.
-/// @param image  Its first channels are R, G and B, multiplied by alpha, and A.
-/// @throw std::runtime_error if Embree fails.
-void draw_obstacles(const Surfaces& surfaces, const LensSetup& setup, int samples, Image& image);
+/// The obstacles of a scene alone. @throw std::runtime_error if Embree fails.
+Geometry obstacles_of(const Surfaces& surfaces);
+
+/// Adds the obstacles between the receiver and the plane of the image to a pixel of the receiver, where its alpha is
+/// less than 1: as the viewer sees them along straight lines, in light from there.
+/// @param samples  Of a pixel along x and along y. @param pixel  R, G and B, multiplied by alpha, and A.
+void draw_obstacles(const Geometry& obstacles, const LensSetup& setup, int samples, const Eigen::Vector2i& at,
+                    Eigen::Vector4f& pixel);
 
 }  // namespace tensorray

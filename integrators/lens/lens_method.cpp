@@ -68,7 +68,7 @@ ChannelTable<LensPixel> lens_channels() {
   using Pixel = const LensPixel&;
   return {
       {{"R", "G", "B"}, [](Pixel pixel) { return pixel.color; }},
-      {{"A"}, [](Pixel pixel) { return std::min(pixel.alpha, 1.0); }},  // Rounding may make the sum greater than 1.
+      {{"A"}, [](Pixel pixel) { return pixel.alpha; }},
       {{"texture.s", "texture.t"}, [](Pixel pixel) { return pixel.point.st; }},
       {{"displacement.x", "displacement.y", "displacement.z"}, [](Pixel pixel) { return pixel.point.displacement; }},
       {{"magnification.log"}, [](Pixel pixel) { return bounded(pixel.point.log_magnification); }},
@@ -115,8 +115,8 @@ void draw_overlay(const LensPicture& picture, const Plate& plane, Image& image) 
 }
 
 /// Puts pictures side by side. All channels are 0 in the gaps.
-Image side_by_side(const std::vector<Image>& images) {
-  if (images.size() == 1) return images.front();
+Image side_by_side(std::vector<Image> images) {
+  if (images.size() == 1) return std::move(images.front());
   const int width = images.front().width, gap = std::max(1, width / gap_part);
   const int count = static_cast<int>(images.size());
   Image all(count * width + (count - 1) * gap, images.front().height, images.front().channels);
@@ -174,7 +174,7 @@ SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
   std::vector<Image> images;
   for (SpectralImage& spectrum : spectra) images.push_back(std::move(spectrum.image));
   SpectralImage all = std::move(spectra.front());
-  all.image = side_by_side(images);
+  all.image = side_by_side(std::move(images));
   return all;
 }
 
@@ -186,6 +186,7 @@ LensSettings LoadedLens::trace_settings(const Scene& scene) const {
   const LightRange range = light_range(scene);
   settings.flexibilities = range.flexibilities;
   settings.range = range.is_range;
+  if (settings_.obstacles == ObstacleLook::shaded) settings.obstacles = &scene.geometry.surfaces();
   return settings;
 }
 
@@ -197,13 +198,11 @@ void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const P
   const std::vector<FineBand> fine = fine_bands(scene, band_count(light.map, channels, band_step));
   const LensPicture picture =
       draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
-  const Plate& plane = light.setup.image.plane;
-  all.pictures.push_back(make_image(picture));
-  if (settings_.obstacles == ObstacleLook::shaded && is_root(light.settings.job ? light.settings.job->ranks : nullptr))
-    draw_obstacles(scene.geometry.surfaces(), light.setup, settings_.samples, all.pictures.back());
-  if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, all.pictures.back());
   add_statistics(picture, light.map.starts.size(), all.statistics);
   all.statistics.seconds_tracing += light.seconds_tracing;
+  if (!is_root(light.settings.job ? light.settings.job->ranks : nullptr)) return;
+  all.pictures.push_back(make_image(picture));
+  if (settings_.overlay == Overlay::grid) draw_overlay(picture, light.setup.image.plane, all.pictures.back());
   if (by_channel)
     // A white image has the radiance of a white diffuse surface in the scene's light.
     all.spectra.push_back(spectral_image(picture.radiance, scene.bands, SpectralQuantity::radiance,
@@ -212,9 +211,9 @@ void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const P
 
 Render LoadedLens::render_of(const Scene& scene, LensPictures all) const {
   Render result;
-  result.linear = side_by_side(all.pictures);
-  const std::vector<OutlineStroke> outline = body_outline(scene, lens_.receiver);
   const int width = all.pictures.front().width, count = static_cast<int>(all.pictures.size());
+  result.linear = side_by_side(std::move(all.pictures));
+  const std::vector<OutlineStroke> outline = body_outline(scene, lens_.receiver);
   for (int i = 0; i < count; ++i)
     for (const OutlineStroke& each : outline) {
       const Eigen::Vector2d right(i * (result.linear.width - width) / std::max(1, count - 1), 0);

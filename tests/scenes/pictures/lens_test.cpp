@@ -186,7 +186,14 @@ void draw(std::vector<TriangleMesh> obstacles, double image_z, int samples, Imag
   Surfaces surfaces;
   surfaces.bounds = box({-1, -1, -1}, {1, 1, 1});
   surfaces.obstacles = std::move(obstacles);
-  draw_obstacles(surfaces, {plate_at(2), {nullptr, plate_at(image_z)}, Vector3d::UnitZ()}, samples, image);
+  const Geometry shown = obstacles_of(surfaces);
+  for (int i = 0; i < pixels * pixels; ++i) {
+    const Eigen::Vector2i at(i % pixels, i / pixels);
+    Eigen::Map<Eigen::Vector4f> pixel(image.pixel(at.x(), at.y()));
+    Eigen::Vector4f seen = pixel;
+    draw_obstacles(shown, {plate_at(2), {nullptr, plate_at(image_z)}, Vector3d::UnitZ()}, samples, at, seen);
+    pixel = seen;
+  }
 }
 
 TEST(LensObstacles, CoverTheirPartOfEachPixelWhereThePictureIsTransparent) {
