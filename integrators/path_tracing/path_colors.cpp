@@ -166,6 +166,7 @@ SurfaceLegend bar_legend(const std::string& title, const ValueRange& range,
 std::string invariant_title(Invariant which, const FieldUnits& units) {
   std::string title = choice_name(which);
   std::replace(title.begin(), title.end(), '_', '\n');
+  if (which == Invariant::von_mises) title = "von Mises";
   const int degree = invariant_degree(which);
   return degree == 0 ? title : title + "\n" + units_of_power(units.tensor, degree);
 }

@@ -142,14 +142,14 @@ Image with_room_below(const Image& image) {
 void draw_scale_bar(Image& image, double pixel_size, const std::string& unit) {
   const Sizes sizes(image);
   const double length = round_length(longest_bar * std::min(image.width, image.height) * pixel_size);
-  const std::string number = round_ticks({0, length}, 2).back().label + " " + (unit.empty() ? "units" : unit);
+  const std::string number = round_ticks({0, length}, 2).back().label, none = number == "1" ? "unit" : "units";
   const Vector2d left(sizes.margin, image.height - sizes.margin), right(left + Vector2d(length / pixel_size, 0));
   const Vector2d end(0, sizes.letter / 2), thick(0, sizes.line), wide(sizes.line, 0);
   // They do not overlap: ink that lies twice on a pixel at the end would make the bar longer.
   const std::array<AlignedBox2d, 3> bars{AlignedBox2d(left - thick, right),
                                          AlignedBox2d(left - end, Vector2d(left + wide - thick)),
                                          AlignedBox2d(Vector2d(right - wide - end), Vector2d(right - thick))};
-  const std::vector<Mark> text{{left - 1.5 * end, {}, number, sizes.letter}};
+  const std::vector<Mark> text{{left - 1.5 * end, {}, number + " " + (unit.empty() ? none : unit), sizes.letter}};
   const AlignedBox2d whole = extent_of(text).merged(bars[0]);
   const bool on_light = is_light(image, whole);
   const Vector2d outline = Vector2d::Constant(sizes.outline);

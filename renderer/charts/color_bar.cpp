@@ -93,6 +93,10 @@ struct Layout {
   double gap() const { return 0.5 * letter; }  ///< Distance between a mark and its label, or a title and the contents.
   double row() const { return 1.6 * letter; }  ///< Distance between the lines of a title.
   double swatch() const { return std::round(1.5 * letter); }  ///< Width of the colour bar and of the squares of a key.
+  double above(const std::string& title) const {              ///< Height of a title and the gap below it.
+    const auto lines = title.empty() ? 0 : 1 + std::count(title.begin(), title.end(), '\n');
+    return std::round(row() * static_cast<double>(lines) + (lines == 0 ? 0 : gap()));
+  }
 };
 
 struct Panel {
@@ -108,7 +112,7 @@ Panel lay_panel(Image& image, const Layout& layout, Eigen::Vector2d size, const 
   std::istringstream text(title);
   for (std::string line; std::getline(text, line);) lines.push_back(line);
   for (const std::string& line : lines) size.x() = std::max(size.x(), text_width(line, layout.letter));
-  const double top = std::round(layout.row() * static_cast<double>(lines.size()) + (lines.empty() ? 0 : layout.gap()));
+  const double top = layout.above(title);
   const double padding = std::round(layout.padding());
   const Eigen::Vector2d full = (size + Eigen::Vector2d(2 * padding, top + 2 * padding)).array().ceil();
   const double middle = (static_cast<double>(place.part) + 0.5) / static_cast<double>(place.parts) * image.height;
@@ -165,7 +169,9 @@ void draw_color_bar(Image& image, const ColorBar& bar, const LegendPlace& place)
   check(bar.range);
   if (!bar.color) throw std::invalid_argument("a colour bar needs colours");
   const Layout layout(image);
-  const double height = std::round(0.6 * image.height / static_cast<double>(place.parts)), end = layout.letter / 2;
+  const double part = image.height / static_cast<double>(place.parts), end = layout.letter / 2;
+  const double room = part - layout.above(bar.title) - 4 * layout.padding() - 2 * end;
+  const double height = std::round(std::max(2 * layout.letter, std::min(0.6 * part, room)));
   const std::vector<Tick> ticks = round_ticks(bar.range, std::clamp(static_cast<int>(height / layout.row()), 2, 7));
   const double mark = std::round(0.4 * layout.letter), labels = layout.swatch() + 2 * layout.line + mark + layout.gap();
   const Panel panel =
