@@ -129,14 +129,16 @@ double round_length(double limit) {
   return decade;
 }
 
-Image with_room_beside(const Image& image) {
+Image with_room_beside(const Image& image, int coarseness) {
+  const int width = coarseness * image.width, height = coarseness * image.height;
   int room = 0;
-  for (int i = 0; i < 8; ++i) room = legend_width(image.width + room, image.height);  // Letters may grow with it.
-  return enlarged(image, room, 0);
+  for (int i = 0; i < 8; ++i) room = legend_width(width + room, height);  // Letters may grow with it.
+  return enlarged(image, static_cast<double>(room) / coarseness, 0);
 }
 
-Image with_room_below(const Image& image) {
-  return enlarged(image, 0, below_letters * letter_height(image.width, image.height));
+Image with_room_below(const Image& image, int coarseness) {
+  const double letter = letter_height(coarseness * image.width, coarseness * image.height);
+  return enlarged(image, 0, below_letters * letter / coarseness);
 }
 
 void draw_scale_bar(Image& image, double pixel_size, const std::string& unit) {

@@ -25,8 +25,9 @@ void draw_scale_bar(Image& image, double pixel_size, const std::string& unit);
 
 /// A picture with room at its right or below it, as a legend or a line of text needs it: black or white, as the picture
 /// is dark or light. The room depends on the size of the picture alone, so that all frames of a film have one size.
-Image with_room_beside(const Image& image);
-Image with_room_below(const Image& image);
+/// @param coarseness  Pixels of the finished picture along an edge of this one's: its room has the same part of it.
+Image with_room_beside(const Image& image, int coarseness = 1);
+Image with_room_below(const Image& image, int coarseness = 1);
 
 /// Draws a line of text in the lower right corner; a long one is smaller.
 void draw_caption(Image& image, const std::string& text);

@@ -95,13 +95,13 @@ constexpr double unseen = 0.5;  // Grey of wavelengths that the eye does not see
 constexpr double pale = 0.03;   // Part of white in the colour of a wavelength, which makes it reproducible.
 
 /// Draws what the scene asks for, and the picture has. Lines of text and a legend beside the picture make it larger.
-/// @param is_lettered  Otherwise only lines of bodies are drawn.
-void draw_annotations(const Scene& scene, const Render& render, double exposure, bool is_lettered, Image& image) {
+/// @param coarseness  Of a preview (> 1), only lines of bodies are drawn.
+void draw_annotations(const Scene& scene, const Render& render, double exposure, int coarseness, Image& image) {
   const OutputDescription& output = scene.description.output;
   const FieldUnits units = units_of(scene);
   draw_outline(image, render.outline, output.wants(Annotation::body), output.wants(Annotation::hidden));
-  if (!is_lettered) return;
-  if (render.view) {
+  const bool is_lettered = coarseness == 1;
+  if (render.view && is_lettered) {
     const Eigen::Vector3d &right = render.view->right, &up = render.view->up;
     if (output.wants(Annotation::scale)) draw_scale_bar(image, render.view->pixel_size, units.length);
     if (output.wants(Annotation::axes)) draw_axes(image, right, up);
@@ -109,13 +109,13 @@ void draw_annotations(const Scene& scene, const Render& render, double exposure,
       draw_anatomy(image, right, up, render.draw_legend ? render.legend_room : 0);
   }
   if (render.draw_legend) {
-    if (render.legend_room == 0) image = with_room_beside(image);
-    render.draw_legend(image, exposure);
+    if (render.legend_room == 0) image = with_room_beside(image, coarseness);
+    if (is_lettered) render.draw_legend(image, exposure);
   }
   for (const std::string& line : {render.legend_note, output.caption})
     if (!line.empty()) {
-      image = with_room_below(image);
-      draw_caption(image, line);
+      image = with_room_below(image, coarseness);
+      if (is_lettered) draw_caption(image, line);
     }
 }
 
@@ -192,10 +192,10 @@ double display_exposure(const Scene& scene, const Render& render) {
   return std::log2(shown_as / *bright);
 }
 
-Image display_image(const Scene& scene, const Render& render, bool holds_alpha, bool is_lettered) {
+Image display_image(const Scene& scene, const Render& render, bool holds_alpha, int coarseness) {
   if (render.display) {
     Image image = *render.display;
-    draw_annotations(scene, render, 0, is_lettered, image);
+    draw_annotations(scene, render, 0, coarseness, image);
     return image;
   }
   const Image& linear = render.linear;
@@ -217,7 +217,7 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha, 
       lay_hatch(image, at % image.width, at / image.width, divides);
     }
   }
-  draw_annotations(scene, render, exposure, is_lettered, image);
+  draw_annotations(scene, render, exposure, coarseness, image);
   scene.color.to_display(image);
   return image;
 }

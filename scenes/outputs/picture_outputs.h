@@ -25,8 +25,9 @@ Output maps_output();
 /// The picture as a display shows it: R, G, B, and A if there is one.
 /// @param holds_alpha  Whether the file format has an alpha. Colours are then divided by alpha, as such formats need
 ///                     them. Otherwise they stay multiplied by it, which shows the picture on black.
-/// @param is_lettered  Whether annotations are on it; otherwise only the lines of bodies, as in coarse previews.
-Image display_image(const Scene& scene, const Render& render, bool holds_alpha, bool is_lettered = true);
+/// @param coarseness   Pixels of the finished picture along an edge of this one's: a preview (> 1) has lines of bodies,
+///                     and room for other annotations.
+Image display_image(const Scene& scene, const Render& render, bool holds_alpha, int coarseness = 1);
 
 /// The exposure of the picture that a display shows, in stops: the scene's, or the one that "auto" chooses.
 double display_exposure(const Scene& scene, const Render& render);

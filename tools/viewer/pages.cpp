@@ -323,7 +323,7 @@ void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading)
   const Scene& scene = live_.scene();
   const Render& render = *page.render;
   auto start = Clock::now();
-  page.display = display_image(scene, render, false, stage.coarseness == 1);
+  page.display = display_image(scene, render, false, stage.coarseness);
   const Statistics& statistics = render.statistics;
   Json phases{{"load", seconds_loading},
               {"trace", statistics.seconds_tracing},

@@ -100,6 +100,9 @@ TEST(AnnotationsTest, RoomIsForALegendAndLeavesThePicture) {
       for (int x = 0; x < width; ++x) ASSERT_EQ(wide.pixel(x, y)[0], 0.6f) << width << ": " << x << ", " << y;
     EXPECT_EQ((wide.width - width) % 2 + (wide.height - height) % 2, 0);
     EXPECT_EQ(with_room.pixel(width, 0)[0], 1);
+    const Image coarse = with_room_below(with_room_beside(blank(width / 4, height / 4, 0.6f), 4), 4);
+    EXPECT_NEAR(4 * coarse.width, wide.width, 8 + width % 4);
+    EXPECT_NEAR(4 * coarse.height, wide.height, 8 + height % 4);
   }
 }
 
