@@ -38,13 +38,13 @@ double max_near(const Film& film, int x, int y) {
 /// Compares the light of the map with single photons: the deviations of the pixels, in units of the noise of the
 /// photons' number and of the light that the map's tolerance may move across a pixel's edge, are those of noise.
 void expect_same_light(const FlowBench& bench, double flexibility, const char* label) {
-  constexpr std::uint64_t photons = 400000;
-  const Film expected = histogram(bench, flexibility, photons);
+  constexpr double photons = 200000;
+  const Film expected = histogram(bench, flexibility, static_cast<std::uint64_t>(photons));
   FlowSettings settings = single(flexibility);
   settings.tolerance = 0.05;
   const Caustic caustic = caustic_of(bench, map_of(bench, settings));
   EXPECT_NEAR(all_power(caustic), 1, 1e-9) << label;
-  const double per_photon = area(bench.beam.aperture) / static_cast<double>(photons) / bench.plate().pixel_area();
+  const double per_photon = area(bench.beam.aperture) / photons / bench.plate().pixel_area();
   double squares = 0;
   for (int y = 0; y < expected.height; ++y)
     for (int x = 0; x < expected.width; ++x) {
@@ -54,7 +54,9 @@ void expect_same_light(const FlowBench& bench, double flexibility, const char* l
       squares += std::pow((light - expected.plane(0)[y * expected.width + x]) / noise, 2);
     }
   EXPECT_LT(squares / static_cast<double>(expected.values.size()), 1) << label;
-  EXPECT_NEAR(sum(caustic.irradiance.values) / sum(expected.values), 1, 2e-3) << label;
+  const double landed = sum(expected.values) / per_photon;  // Photons, of which the number is binomial.
+  const double noise = std::sqrt(std::max(photons - landed, 1.0) / photons / landed);
+  EXPECT_NEAR(sum(caustic.irradiance.values) / sum(expected.values), 1, 4 * noise) << label;
 }
 
 /// With a memory, light to another plate is traced only where it was not traced before.
@@ -138,10 +140,10 @@ Matrix3d hook(const Vector3d& at) {
 /// Corners of quads at the edge of the beam agree, and what lies between them lands elsewhere.
 TEST(FlowMap, LightThatLeavesBetweenCornersIsNotOverlooked) {
   constexpr double size = 3;
-  for (const int resolution : {64, 128, 256}) {
+  for (const int resolution : {64, 256}) {
     const FlowBench bench = make_bench(hook, plate_at(4, size, resolution));
     const Film light = caustic_of(bench, map_of(bench, single(0.4))).irradiance;
-    const Film expected = histogram(bench, 0.4, 400000);
+    const Film expected = histogram(bench, 0.4, 200000);
     const auto beside = [&](const Film& film) {  // More than 0.05 beside the undisturbed beam.
       double sum = 0;
       for (int y = 0; y < resolution; ++y)
@@ -150,7 +152,7 @@ TEST(FlowMap, LightThatLeavesBetweenCornersIsNotOverlooked) {
       return sum * bench.plate().pixel_area() / area(bench.beam.aperture);
     };
     // Where light is torn, half of a smallest quad may be on the wrong side; the beam is 2 wide.
-    const double part = beside(expected), noise = std::sqrt(part / 400000),
+    const double part = beside(expected), noise = std::sqrt(part / 200000),
                  torn = 2 * 0.5 * single(0.4).finest * size / resolution / 2;
     EXPECT_GT(part, 0.02);
     EXPECT_NEAR(beside(light), part, 4 * noise + torn) << resolution;
