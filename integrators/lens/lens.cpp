@@ -136,11 +136,7 @@ void draw_tile(const LensView& view, int tile, const std::optional<Geometry>& ob
       const double alpha = *std::max_element(light.alpha.begin(), light.alpha.end());
       Eigen::Vector4d seen;
       seen << light.color, std::min(alpha, 1.0);  // Rounding may make the sum greater than 1.
-      if (obstacles) {
-        Eigen::Vector4f covered = seen.cast<float>();
-        draw_obstacles(*obstacles, view.light.setup, view.light.settings.samples, at, covered);
-        seen = covered.cast<double>();
-      }
+      if (obstacles) draw_obstacles(*obstacles, view.light.setup, view.light.settings.samples, at, seen);
       for (int c = 0; c < 3; ++c) picture.color.plane(c)[pixel] = seen[c];
       picture.alpha[pixel] = seen[3];
       for (int c = 0; c < picture.radiance.channels; ++c)
@@ -316,16 +312,16 @@ Geometry obstacles_of(const Surfaces& surfaces) {
 }
 
 void draw_obstacles(const Geometry& obstacles, const LensSetup& setup, int samples, const Eigen::Vector2i& at,
-                    Eigen::Vector4f& pixel) {
-  const float open = 1 - pixel[3];
+                    Eigen::Vector4d& pixel) {
+  const double open = 1 - pixel[3];
   if (!(open > 0)) return;
   Vector2d seen(0, 0);
   for (int i = 0; i < samples * samples; ++i)
     seen +=
         see_obstacle(obstacles, setup, at.cast<double>() + Vector2d(i % samples + 0.5, i / samples + 0.5) / samples);
-  const Eigen::Vector2f added = open * (seen / (samples * samples)).cast<float>();
-  pixel.head<3>().array() += added[0];
-  pixel[3] = std::min(pixel[3] + added[1], 1.0f);
+  seen *= open / (samples * samples);
+  pixel.head<3>().array() += seen[0];
+  pixel[3] = std::min(pixel[3] + seen[1], 1.0);
 }
 
 }  // namespace tensorray

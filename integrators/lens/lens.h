@@ -208,6 +208,6 @@ Geometry obstacles_of(const Surfaces& surfaces);
 /// less than 1: as the viewer sees them along straight lines, in light from there.
 /// @param samples  Of a pixel along x and along y. @param pixel  R, G and B, multiplied by alpha, and A.
 void draw_obstacles(const Geometry& obstacles, const LensSetup& setup, int samples, const Eigen::Vector2i& at,
-                    Eigen::Vector4f& pixel);
+                    Eigen::Vector4d& pixel);
 
 }  // namespace tensorray

@@ -36,8 +36,8 @@ struct Turn {
   int squares;
 };
 
-/// Sets the turns of steps. They are joined to those of the steps before where that leaves out a millionth of them (the
-/// series of Baker, Campbell and Hausdorff).
+/// Sets the turns of steps. They are joined to those of the steps before where the series of Baker, Campbell and
+/// Hausdorff leaves out less than 1e-6.
 /// @param steps  With a and b of g = 1. @param turns  Before: of the steps before; at first 0.
 void add_turns(const RaySteps& steps, RayTurns& turns);
 

@@ -271,9 +271,10 @@ void Pages::make_stage(const PagePointer& page) {
   const bool is_first = stage.is_first();
   {
     std::unique_lock<std::mutex> lock(mutex_);
-    const auto is_asked = [&] {
-      return ends_ || std::any_of(pages_.begin(), pages_.end(),
-                                  [](const PagePointer& any) { return any->scene || !any->requests.empty(); });
+    const auto is_asked = [&] {  // Or the page is closed.
+      return ends_ || std::find(pages_.begin(), pages_.end(), page) == pages_.end() ||
+             std::any_of(pages_.begin(), pages_.end(),
+                         [](const PagePointer& any) { return any->scene || !any->requests.empty(); });
     };
     if (stage.is_known && wake_.wait_for(lock, idle, is_asked)) return page->stages.push_front(stage);
     if (page->scene && !is_first) return;

@@ -190,9 +190,9 @@ void draw(std::vector<TriangleMesh> obstacles, double image_z, int samples, Imag
   for (int i = 0; i < pixels * pixels; ++i) {
     const Eigen::Vector2i at(i % pixels, i / pixels);
     Eigen::Map<Eigen::Vector4f> pixel(image.pixel(at.x(), at.y()));
-    Eigen::Vector4f seen = pixel;
+    Eigen::Vector4d seen = pixel.cast<double>();
     draw_obstacles(shown, {plate_at(2), {nullptr, plate_at(image_z)}, Vector3d::UnitZ()}, samples, at, seen);
-    pixel = seen;
+    pixel = seen.cast<float>();
   }
 }
 

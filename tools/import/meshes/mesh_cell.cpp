@@ -154,12 +154,14 @@ double MeshCell::volume() const {
     for (const Tetrahedron& tetrahedron : tetrahedra_) volume += std::abs(tetrahedron.edges.determinant()) / 6;
     return volume;
   }
-  pieces_->SetDataTypeToDouble();
-  cell_->Triangulate(0, piece_ids_, pieces_);
+  vtkNew<vtkIdList> ids;
+  vtkNew<vtkPoints> tetrahedra;
+  tetrahedra->SetDataTypeToDouble();
+  cell_->Triangulate(0, ids, tetrahedra);
   double volume = 0;
-  for (vtkIdType i = 0; i + 3 < pieces_->GetNumberOfPoints(); i += 4) {
+  for (vtkIdType i = 0; i + 3 < tetrahedra->GetNumberOfPoints(); i += 4) {
     Eigen::Matrix<double, 3, 4> corners;
-    for (int k = 0; k < 4; ++k) pieces_->GetPoint(i + k, corners.col(k).data());
+    for (int k = 0; k < 4; ++k) tetrahedra->GetPoint(i + k, corners.col(k).data());
     const Eigen::Matrix3d edges = corners.rightCols<3>().colwise() - corners.col(0);
     volume += std::abs(edges.determinant()) / 6;
   }

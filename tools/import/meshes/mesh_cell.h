@@ -7,9 +7,7 @@
 #include <Eigen/Geometry>
 #include <vtkDataSet.h>
 #include <vtkGenericCell.h>
-#include <vtkIdList.h>
 #include <vtkNew.h>
-#include <vtkPoints.h>
 
 namespace tensorray {
 
@@ -99,8 +97,6 @@ class MeshCell {
   bool find_in_tetrahedra(const Eigen::Vector3d& x, double tolerance);
 
   vtkNew<vtkGenericCell> cell_;
-  vtkNew<vtkIdList> piece_ids_;  ///< Of volume(), which is called often: VTK's objects are slow to make.
-  vtkNew<vtkPoints> pieces_;
   Shape shape_ = Shape::tetrahedra;
   Derivatives kind_ = Derivatives::by_axis;
   bool linear_ = true;
