@@ -1,30 +1,32 @@
 # Strict warnings for the project's own code, and `tensorray_library(NAME)`, which makes a static library from a folder.
 
 add_library(tensorray_options INTERFACE)
-target_compile_options(tensorray_options INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wnon-virtual-dtor
-                       -Woverloaded-virtual -Wcast-align -Wunused -Wnull-dereference)
 # No code here looks at errno of mathematical functions; without it, a square root is one instruction.
 target_compile_options(tensorray_options INTERFACE -fno-math-errno)
-if(TENSORRAY_WERROR)
-  target_compile_options(tensorray_options INTERFACE -Werror)
-endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # The compiler collects its garbage from 4 GB on, not from 128 MB: a seventh of its time, for a fifth more memory.
   target_compile_options(tensorray_options INTERFACE --param=ggc-min-heapsize=4000000)
-  # False positives inside inlined Eigen and standard library code at -O3.
-  target_compile_options(tensorray_options INTERFACE -Wno-maybe-uninitialized -Wno-null-dereference
-                         -Wno-array-bounds -Wno-stringop-overflow)
 endif()
-if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
-  target_compile_options(tensorray_options INTERFACE -Wno-sign-conversion)  # Which -Wconversion of GCC leaves out.
-endif()
-if(TENSORRAY_UNITY)
-  # What is in the unnamed namespace of a source, its group may shadow, and its classes may contain.
+# To look for warnings takes a tenth of the time: where they are not errors, nothing does.
+if(NOT TENSORRAY_WERROR)
+  target_compile_options(tensorray_options INTERFACE -w)
+else()
+  target_compile_options(tensorray_options INTERFACE -Werror -Wall -Wextra -Wpedantic -Wconversion -Wnon-virtual-dtor
+                         -Woverloaded-virtual -Wcast-align -Wunused -Wnull-dereference)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # False positives inside inlined Eigen and standard library code at -O3.
+    target_compile_options(tensorray_options INTERFACE -Wno-maybe-uninitialized -Wno-null-dereference
+                           -Wno-array-bounds -Wno-stringop-overflow)
+  endif()
+  if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+    target_compile_options(tensorray_options INTERFACE -Wno-sign-conversion)  # Which -Wconversion of GCC leaves out.
+  endif()
+  if(NOT TENSORRAY_UNITY)
+    target_compile_options(tensorray_options INTERFACE -Wshadow)
+  elseif(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # What is in the unnamed namespace of a source, its group may shadow, and its classes may contain.
     target_compile_options(tensorray_options INTERFACE -Wshadow=local -Wno-subobject-linkage)
   endif()
-else()
-  target_compile_options(tensorray_options INTERFACE -Wshadow)
 endif()
 if(TENSORRAY_SANITIZE)
   target_compile_definitions(tensorray_options INTERFACE TENSORRAY_SANITIZED)  # Clang 14 has no macro for all of them.
@@ -63,13 +65,18 @@ endfunction()
 
 # Half of the time to compile most files is the headers that nearly all of them include: these are compiled once, for
 # relocatable code. With GCC they bring their level of optimisation to all that uses them, so that `scenes` has its own.
+# Those of `integrators` are also the scene and its keys, on which all methods depend.
 function(tensorray_common_headers name)
   set(headers <Eigen/Geometry> <algorithm> <filesystem> <functional> <map> <memory> <optional> <string> <variant>
-              <vector>)
+              <vector> <tbb/parallel_for.h>)
   if(name STREQUAL base)
     target_precompile_headers(base PRIVATE ${headers})
-  elseif(name MATCHES "^(scenes|integrators)$")
-    target_precompile_headers(${name} PRIVATE ${headers} <fmt/format.h> <nlohmann/json.hpp>)
+  elseif(name STREQUAL scenes)
+    target_precompile_headers(scenes PRIVATE ${headers} <fmt/format.h> <nlohmann/json.hpp>)
+  elseif(name STREQUAL integrators)
+    target_precompile_headers(integrators PRIVATE ${headers} <fmt/format.h> <nlohmann/json.hpp>
+                              ${PROJECT_SOURCE_DIR}/scenes/description/scene_keys.h
+                              ${PROJECT_SOURCE_DIR}/scenes/scene/scene.h ${PROJECT_SOURCE_DIR}/scenes/scene/render.h)
   else()
     target_precompile_headers(${name} REUSE_FROM base)
   endif()

@@ -11,6 +11,18 @@
 #include "base/text/text.h"
 
 namespace tensorray {
+
+template class MemberOf<bool>;
+template class MemberOf<int>;
+template class MemberOf<std::size_t>;
+template class MemberOf<double>;
+template class MemberOf<std::optional<double>>;
+template class MemberOf<std::string>;
+template class MemberOf<std::filesystem::path>;
+template class MemberOf<Eigen::Vector3d>;
+template class MemberOf<std::optional<Eigen::Vector2d>>;
+template class MemberOf<std::optional<Eigen::Vector3d>>;
+
 namespace {
 
 /// How many letters must be inserted, removed, replaced or swapped with their neighbour to turn `b` into `a`.

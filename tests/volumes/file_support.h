@@ -1,10 +1,9 @@
 #pragma once
 /// Temporary files, a tensor grid with everything that files must keep, and grids that OpenVDB itself writes.
 
-#include <openvdb/openvdb.h>
-
 #include "tests/files.h"
 #include "tests/volumes/grid_support.h"
+#include "volumes/vdb/vdb_archive.h"
 
 namespace tensorray {
 
@@ -24,9 +23,8 @@ inline TensorGrid sparse_grid() {
 }
 
 template <class Grid>
-typename Grid::Ptr stock_grid(const std::string& name, typename Grid::ValueType background) {
-  openvdb::initialize();
-  const auto grid = Grid::create(background);
+typename Grid::Ptr stock_grid(const std::string& name) {
+  const auto grid = empty_grid<Grid>();
   grid->setName(name);
   return grid;
 }
@@ -36,7 +34,7 @@ template <class Set>
 openvdb::GridPtrVec stock_rows(const std::string& name, const Set& set) {
   openvdb::GridPtrVec rows;
   for (int row = 0; row < 3; ++row) {
-    const auto grid = stock_grid<openvdb::Vec3SGrid>(name + "_row" + std::to_string(row), openvdb::Vec3s(0));
+    const auto grid = stock_grid<openvdb::Vec3SGrid>(name + "_row" + std::to_string(row));
     set(*grid, row);
     rows.push_back(grid);
   }

@@ -7,13 +7,13 @@
 #include <vector>
 
 #include <benchmark/benchmark.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
 #include "renderer/meshes/mesh.h"
 #include "tools/benchmark/questions.h"
 #include "tracing/trace/trace.h"
 #include "volumes/making/generators.h"
+#include "volumes/vdb/vdb_archive.h"
 
 namespace tensorray::bench {
 namespace {
@@ -130,7 +130,7 @@ using RowGrids = std::array<openvdb::Vec3SGrid::Ptr, 3>;
 RowGrids make_rows(const TensorGrid& tensors) {
   RowGrids rows;
   for (int row = 0; row < 3; ++row) {
-    rows[row] = openvdb::Vec3SGrid::create();
+    rows[row] = empty_grid<openvdb::Vec3SGrid>();
     for (const TensorBlock& block : tensors.blocks) {
       auto* leaf = rows[row]->tree().touchLeaf({block.origin.x(), block.origin.y(), block.origin.z()});
       for (int i = 0; i < TensorBlock::voxels; ++i) {

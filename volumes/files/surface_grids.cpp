@@ -16,7 +16,7 @@ constexpr std::size_t rows_of_block = TensorBlock::voxels / 2;
 /// @param place_of_cube  Of edge 1: the voxels are in it.
 openvdb::GridBase::Ptr list_grid(const std::string& name, const std::vector<Vector3d>& rows,
                                  const Eigen::Affine3d& place_of_cube) {
-  const auto grid = openvdb::Vec3SGrid::create();
+  const auto grid = empty_grid<openvdb::Vec3SGrid>();
   grid->setName(name);
   grid->setVectorType(openvdb::VEC_INVARIANT);
   const std::size_t blocks = (rows.size() + rows_of_block - 1) / rows_of_block;

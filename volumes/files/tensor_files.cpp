@@ -188,61 +188,53 @@ BlockSource stress_of(BlockSource source, float sign) {
   return source;
 }
 
+/// Adds metadata to a grid, and keeps the grid's own entries: name, class, type, ...
+void note(const std::map<std::string, std::string>& metadata, openvdb::MetaMap& grid) {
+  for (const auto& [key, value] : metadata)
+    if (!grid[key] && key != length_unit_key) grid.insertMeta(key, openvdb::StringMetadata(value));
+}
+
 [[noreturn]] void fail_too_large(const std::filesystem::path& path, const std::string& field) {
   fail(path, "the active voxels of \"" + field + "\" do not fit in memory; resample it more coarsely");
 }
 
-/// One row of the tensors of a level of a grid, which must outlive it, as a grid of vectors that is only for writing:
-/// its leaves have masks, and get their values when they are written, one at a time.
-class RowGrid : public openvdb::Vec3SGrid {
- public:
-  using Leaf = openvdb::Vec3STree::LeafNodeType;
+using RowLeaf = openvdb::Vec3STree::LeafNodeType;
 
-  RowGrid(const TensorGrid& grid, std::size_t level, int row, bool is_half) : row_(row) {
-    setName(grid.name + "_row" + std::to_string(row) + level_suffix(level));
-    place(*this, to_world_of_level(grid.to_world, static_cast<int>(level)));
-    setGridClass(openvdb::GRID_UNKNOWN);
-    setVectorType(openvdb::VEC_INVARIANT);
-    setSaveFloatAsHalf(is_half);
-    for (const auto& [key, value] : grid.metadata)
-      if (!(*this)[key] && key != length_unit_key)
-        insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, type, ...
-    const TensorBlocks& blocks = *levels_of(grid)[level];
-    const std::vector<BlockShape> shapes = shapes_of(blocks);
-    for (std::size_t i = 0; i < shapes.size(); ++i) {
-      auto* const leaf = new Leaf(openvdb::PartialCreate(), coord_of(shapes[i].origin));
-      tree().addLeaf(leaf);  // The tree owns it.
-      blocks_.emplace(leaf, &blocks[i]);
-      for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-        leaf->setActiveState(static_cast<openvdb::Index>(offset), shapes[i].active[offset]);
-    }
+RowLeaf row_leaf(const TensorBlock& block, int row) {
+  RowLeaf leaf(coord_of(block.origin));
+  for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+    if (!block.active[offset]) continue;
+    const auto values = block.values[offset].row(row);
+    leaf.setValueOn(static_cast<openvdb::Index>(offset), openvdb::Vec3s(values[0], values[1], values[2]));
   }
+  return leaf;
+}
 
-  /// What the file says that its voxels take.
-  openvdb::Index64 memUsage() const override {
-    return openvdb::Vec3SGrid::memUsage() + tree().leafCount() * Leaf::SIZE * sizeof(openvdb::Vec3s);
+/// One row of the tensors of a level of a grid, which must outlive it, as a grid of vectors: its leaves have masks, and
+/// get their values when they are written, one at a time.
+WrittenGrid row_grid(const TensorGrid& grid, std::size_t level, int row, bool is_half) {
+  const auto result = empty_grid<openvdb::Vec3SGrid>();
+  result->setName(grid.name + "_row" + std::to_string(row) + level_suffix(level));
+  place(*result, to_world_of_level(grid.to_world, static_cast<int>(level)));
+  result->setVectorType(openvdb::VEC_INVARIANT);
+  result->setSaveFloatAsHalf(is_half);
+  note(grid.metadata, *result);
+  const TensorBlocks& blocks = *levels_of(grid)[level];
+  std::unordered_map<const RowLeaf*, const TensorBlock*> block_of;
+  const std::vector<BlockShape> shapes = shapes_of(blocks);
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    auto* const leaf = new RowLeaf(openvdb::PartialCreate(), coord_of(shapes[i].origin));
+    result->tree().addLeaf(leaf);  // The tree owns it.
+    block_of.emplace(leaf, &blocks[i]);
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      leaf->setActiveState(static_cast<openvdb::Index>(offset), shapes[i].active[offset]);
   }
-
-  /// The format: the buffers of all leaves, in their order in the tree.
-  void writeBuffers(std::ostream& file) const override {
-    for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf)
-      filled(*blocks_.at(&*leaf)).writeBuffers(file, saveFloatAsHalf());
-  }
-
- private:
-  Leaf filled(const TensorBlock& block) const {
-    Leaf leaf(coord_of(block.origin));
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
-      if (!block.active[offset]) continue;
-      const auto values = block.values[offset].row(row_);
-      leaf.setValueOn(static_cast<openvdb::Index>(offset), openvdb::Vec3s(values[0], values[1], values[2]));
-    }
-    return leaf;
-  }
-
-  const int row_;
-  std::unordered_map<const Leaf*, const TensorBlock*> blocks_;
-};
+  auto write_values = [row, is_half, result, block_of = std::move(block_of)](std::ostream& file) {
+    for (auto leaf = result->tree().cbeginLeaf(); leaf; ++leaf)
+      row_leaf(*block_of.at(&*leaf), row).writeBuffers(file, is_half);
+  };
+  return {result, std::move(write_values), shapes.size() * RowLeaf::SIZE * sizeof(openvdb::Vec3s)};
+}
 
 void check_half_range(const std::filesystem::path& path, const TensorGrid& grid) {
   for (const TensorBlocks* blocks : levels_of(grid))
@@ -263,7 +255,7 @@ Eigen::Vector3i first_voxel(const Grid& grid) {
 }
 
 openvdb::FloatGrid::Ptr float_grid(const ScalarGrid& grid) {
-  const auto result = openvdb::FloatGrid::create();
+  const auto result = empty_grid<openvdb::FloatGrid>();
   for (const ScalarBlock& block : grid.blocks) {
     auto* leaf = new openvdb::FloatTree::LeafNodeType(coord_of(block.origin));
     result->tree().addLeaf(leaf);  // The tree owns it.
@@ -273,9 +265,7 @@ openvdb::FloatGrid::Ptr float_grid(const ScalarGrid& grid) {
   result->setName(grid.name);
   place(*result, grid.to_world);
   result->setGridClass(grid.fog ? openvdb::GRID_FOG_VOLUME : openvdb::GRID_UNKNOWN);
-  for (const auto& [key, value] : grid.metadata)
-    if (!(*result)[key])
-      result->insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, class, ...
+  note(grid.metadata, *result);
   return result;
 }
 
@@ -323,11 +313,11 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
 
 void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool is_half, bool zip) {
   if (is_half) check_half_range(path, grid);
-  openvdb::GridPtrVec rows;
+  std::vector<WrittenGrid> rows;
   for (std::size_t level = 0; level <= grid.finer.size(); ++level)
-    for (int row = 0; row < 3; ++row) rows.push_back(std::make_shared<RowGrid>(grid, level, row, is_half));
+    for (int row = 0; row < 3; ++row) rows.push_back(row_grid(grid, level, row, is_half));
   for (const auto& part : surface_grids(grid.surface, grid.name, grid.to_world, first_voxel(grid)))
-    rows.push_back(part);
+    rows.push_back({part});
   openvdb::MetaMap metadata;
   for (const auto& [key, value] : grid.metadata)
     if (key != length_unit_key) metadata.insertMeta(key, openvdb::StringMetadata(value));
@@ -336,13 +326,12 @@ void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid,
 
 void write_scalar_vdb(const std::filesystem::path& path, const std::vector<ScalarGrid>& grids,
                       const std::map<std::string, std::string>& metadata, const TriangleMesh& surface) {
-  openvdb::initialize();
   openvdb::MetaMap of_file;
   for (const auto& [key, value] : metadata) of_file.insertMeta(key, openvdb::StringMetadata(value));
-  openvdb::GridPtrVec all;
-  for (const ScalarGrid& grid : grids) all.push_back(float_grid(grid));
+  std::vector<WrittenGrid> all;
+  for (const ScalarGrid& grid : grids) all.push_back({float_grid(grid)});
   for (const ScalarGrid& grid : grids)
-    for (const auto& part : surface_grids(surface, grid.name, grid.to_world, first_voxel(grid))) all.push_back(part);
+    for (const auto& part : surface_grids(surface, grid.name, grid.to_world, first_voxel(grid))) all.push_back({part});
   write_vdb(path, all, of_file);
 }
 

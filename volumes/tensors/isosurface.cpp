@@ -9,11 +9,11 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include "volumes/bricks/brick_layout.h"
 #include "volumes/sampling/tensor_sampler.h"
+#include "volumes/vdb/vdb_archive.h"
 
 namespace tensorray {
 namespace {
@@ -65,7 +65,7 @@ openvdb::FloatGrid::Ptr invariant_grid(const TensorField& field, const Voxels& b
   const auto brick_of = [](int index) { return index >> 3; };
   static_assert(TensorBrick::cells == 8, "a brick's index is a voxel's, less three bits");
   const Vector3i first = box.min().unaryExpr(brick_of), last = box.max().unaryExpr(brick_of);
-  const openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0);
+  const openvdb::FloatGrid::Ptr grid = empty_grid<openvdb::FloatGrid>();
   openvdb::FloatGrid::Accessor accessor = grid->getAccessor();
   for (int x = first.x(); x <= last.x(); ++x)
     for (int y = first.y(); y <= last.y(); ++y)
@@ -158,7 +158,6 @@ Isosurface isosurface(const TensorField& field, Invariant which, double value) {
   const Voxels box = Voxels(field.voxels().min().cast<int>(), field.voxels().max().cast<int>());
   if (box.sizes().minCoeff() < 1)
     throw std::invalid_argument("an isosurface needs a field with at least two voxels along each axis");
-  openvdb::initialize();
   const openvdb::FloatGrid::Ptr grid = invariant_grid(field, box, which);
   Isosurface surface;
   surface.mesh = cut_to(field.index_bounds(), contours(*grid, value), field.to_world());

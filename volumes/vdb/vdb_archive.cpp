@@ -245,14 +245,14 @@ class Writer : private openvdb::io::Archive {
     if (zip) setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
   }
 
-  void write_file(std::fstream& file, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
+  void write_file(std::fstream& file, const std::vector<WrittenGrid>& grids, const openvdb::MetaMap& metadata) {
     auto stream_metadata = std::make_shared<openvdb::io::StreamMetadata>();
     openvdb::io::setStreamMetadataPtr(file, stream_metadata, /*transfer=*/false);
     writeHeader(file, /*seekable=*/true);
     metadata.writeMeta(file);
     const auto count = static_cast<std::int32_t>(grids.size());
     file.write(reinterpret_cast<const char*>(&count), sizeof count);
-    for (const openvdb::GridBase::Ptr& grid : grids) write_grid(file, *grid);
+    for (const WrittenGrid& written : grids) write_grid(file, written);
     file.flush();
     make_tag_of_contents(file);
   }
@@ -260,7 +260,8 @@ class Writer : private openvdb::io::Archive {
  private:
   /// As Archive::writeGrid, but without a table of leaves: for that, all values must be in memory, and are compressed
   /// twice.
-  void write_grid(std::ostream& file, openvdb::GridBase& grid) const {
+  void write_grid(std::ostream& file, const WrittenGrid& written) const {
+    openvdb::GridBase& grid = *written.grid;
     openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type(), grid.saveFloatAsHalf());
     descriptor.writeHeader(file);
     const std::streampos positions = file.tellp();
@@ -268,13 +269,18 @@ class Writer : private openvdb::io::Archive {
     descriptor.setGridPos(file.tellp());
     setGridCompression(file, grid);
     grid.addStatsMetadata();
+    grid.insertMeta(openvdb::GridBase::META_FILE_MEM_BYTES,
+                    openvdb::Int64Metadata(static_cast<openvdb::Int64>(grid.memUsage() + written.value_bytes)));
     const std::string compressed = openvdb::io::compressionToString(openvdb::io::getDataCompression(file));
     grid.insertMeta(openvdb::GridBase::META_FILE_COMPRESSION, openvdb::StringMetadata(compressed));
     grid.writeMeta(file);
     grid.writeTransform(file);
     grid.writeTopology(file);
     descriptor.setBlockPos(file.tellp());
-    grid.writeBuffers(file);
+    if (written.write_values)
+      written.write_values(file);
+    else
+      grid.writeBuffers(file);
     descriptor.setEndPos(file.tellp());
     file.seekp(positions);
     descriptor.writeStreamPos(file);
@@ -354,8 +360,8 @@ VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>&
 
 void fail_damaged_voxels(const std::filesystem::path& path) { fail_damaged(path, ""); }
 
-void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata,
-               bool zip) {
+void write_vdb(const std::filesystem::path& path, const std::vector<WrittenGrid>& grids,
+               const openvdb::MetaMap& metadata, bool zip) {
   openvdb::initialize();
   std::vector<char> buffer(stream_buffer);
   std::fstream file;

@@ -9,6 +9,8 @@
 #include <bitset>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <iosfwd>
 #include <memory>
 #include <optional>
 #include <set>
@@ -52,6 +54,14 @@ struct VdbFile {
 /// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, damaged.
 VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted = {});
 
+/// An empty grid of a type that OpenVDB registers, made by the library: where a constructor is called, the compiler
+/// makes all virtual functions of the grid and its tree once more, which takes seconds.
+template <class Grid>
+typename Grid::Ptr empty_grid() {
+  openvdb::initialize();
+  return openvdb::gridPtrCast<Grid>(openvdb::GridBase::createGrid(Grid::gridType()));
+}
+
 /// The active voxels of a leaf, in the order of a TensorBlock.
 template <class Leaf>
 std::bitset<TensorBlock::voxels> voxel_mask(const Leaf& leaf) {
@@ -65,13 +75,20 @@ std::bitset<TensorBlock::voxels> voxel_mask(const Leaf& leaf) {
 /// Reports damage in the voxels of a leaf. @throw std::runtime_error as read_vdb.
 [[noreturn]] void fail_damaged_voxels(const std::filesystem::path& path);
 
-/// Writes grids in place with OpenVDB's default compression, and adds their statistics to their metadata; writeBuffers
-/// is called once for each, and is the only one of their functions that needs voxels' values. Equal grids give equal
-/// bytes: the file's unique tag, which OpenVDB draws at random, is replaced by a hash of the contents.
+/// A grid to be written.
+struct WrittenGrid {
+  openvdb::GridBase::Ptr grid;
+  /// Writes the buffers of all leaves in their order in the tree, if they have no values in memory. Called once.
+  std::function<void(std::ostream&)> write_values = {};
+  openvdb::Index64 value_bytes = 0;  ///< What these values would take in memory.
+};
+
+/// Writes grids in place with OpenVDB's default compression, and adds their statistics to their metadata. Equal grids
+/// give equal bytes: the file's unique tag, which OpenVDB draws at random, is replaced by a hash of the contents.
 /// @throw std::runtime_error naming the file and the reason, also when the disk is full.
 /// @param zip  Compress with zlib instead: slower, and smaller where values have few different bytes.
-void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata,
-               bool zip = false);
+void write_vdb(const std::filesystem::path& path, const std::vector<WrittenGrid>& grids,
+               const openvdb::MetaMap& metadata, bool zip = false);
 
 // Where the voxels of a grid are. OpenVDB refuses transforms whose determinant is below 3e-15, such as voxels of ten
 // micrometres in metres. Grids with smaller voxels are stored in a smaller unit of length, which their metadata have as

@@ -7,13 +7,12 @@
 #include <regex>
 #include <sstream>
 
-#include <openvdb/openvdb.h>
-
 #include "base/constants.h"
 #include "renderer/images/image.h"
 #include "tests/data_folder.h"
 #include "tests/program/import_support.h"
 #include "tests/program/support.h"
+#include "volumes/vdb/vdb_archive.h"
 
 namespace tensorray {
 namespace {
@@ -187,7 +186,7 @@ class OddFields : public Program {
   static Rows rows(int voxels) {
     Rows grids;
     for (int row = 0; row < 3; ++row) {
-      auto grid = openvdb::Vec3SGrid::create();
+      auto grid = empty_grid<openvdb::Vec3SGrid>();
       grid->setName("T_row" + std::to_string(row));
       openvdb::Vec3f value(0);
       value[row] = static_cast<float>(row + 1);

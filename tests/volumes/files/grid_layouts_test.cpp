@@ -122,7 +122,7 @@ TEST(GridLayouts, AWrongMapIsAnErrorThatNamesTheKey) {
 
 /// A scalar grid with the value f(position) at 10³ voxels of 0.125.
 openvdb::FloatGrid::Ptr scalar_of(const std::string& name, double (*f)(const Vector3d&)) {
-  const auto grid = stock_grid<openvdb::FloatGrid>(name, 0);
+  const auto grid = stock_grid<openvdb::FloatGrid>(name);
   grid->setTransform(openvdb::math::Transform::createLinearTransform(0.125));
   for (int x = 7; x < 17; ++x)
     for (int y = 0; y < 10; ++y)
@@ -159,7 +159,7 @@ Matrix3d quadratic_gradient(const Vector3d& p) {
 TEST(GridLayouts, AStaggeredVelocityIsDifferentiatedOnItsFaces) {
   constexpr double h = 0.125;
   for (const bool is_staggered : {true, false}) {
-    const auto grid = stock_grid<openvdb::Vec3SGrid>("vel", openvdb::Vec3s(0));
+    const auto grid = stock_grid<openvdb::Vec3SGrid>("vel");
     grid->setTransform(openvdb::math::Transform::createLinearTransform(h));
     if (is_staggered) grid->setGridClass(openvdb::GRID_STAGGERED);
     for (int x = 0; x < 20; ++x)

@@ -91,8 +91,7 @@ class DamagedLevels : public testing::TestWithParam<Damage> {};
 void add_rows(openvdb::GridPtrVec& grids, int level, double voxel_size,
               const std::function<void(openvdb::Vec3STree& tree)>& set, int count = 3) {
   for (int row = 0; row < count; ++row) {
-    const auto grid =
-        stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row) + level_suffix(level), openvdb::Vec3s(0));
+    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row) + level_suffix(level));
     grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel_size));
     set(grid->tree());
     grids.push_back(grid);
@@ -130,7 +129,7 @@ std::vector<Damage> damages() {
       {"another type",
        [=](auto& grids) {
          add_rows(grids, 1, 0.5, half, 2);
-         grids.push_back(stock_grid<openvdb::FloatGrid>("T_row2@1", 0));
+         grids.push_back(stock_grid<openvdb::FloatGrid>("T_row2@1"));
        },
        "T_row2@1 is float"},
   };
@@ -155,7 +154,7 @@ TEST(LevelFiles, GradientsAreOfEachLevel) {
   openvdb::GridPtrVec grids;
   for (int level = 0; level < 2; ++level) {
     const double size = std::pow(0.5, level);
-    const auto grid = stock_grid<openvdb::Vec3SGrid>("U" + level_suffix(level), openvdb::Vec3s(0));
+    const auto grid = stock_grid<openvdb::Vec3SGrid>("U" + level_suffix(level));
     grid->setTransform(openvdb::math::Transform::createLinearTransform(size));
     for (int x = 0; x <= (level == 0 ? 16 : 15); ++x)
       for (int y = 0; y <= 16 << level; ++y)

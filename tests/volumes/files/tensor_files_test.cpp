@@ -117,7 +117,7 @@ TEST(TensorFiles, StockOpenVdbReadsThem) {
 TEST(TensorFiles, DoublePrecisionRows) {
   openvdb::GridPtrVec rows;
   for (int row = 0; row < 3; ++row) {
-    rows.push_back(stock_grid<openvdb::Vec3DGrid>("T_row" + std::to_string(row), openvdb::Vec3d(0)));
+    rows.push_back(stock_grid<openvdb::Vec3DGrid>("T_row" + std::to_string(row)));
     openvdb::gridPtrCast<openvdb::Vec3DGrid>(rows.back())->tree().setValue({0, 0, 0}, {row + 0.5, row + 1.5, 1e300});
   }
   const Temporary path("a.vdb");
@@ -238,7 +238,7 @@ TEST(TensorFiles, ActiveTilesAreVoxels) {
 }
 
 TEST(TensorFiles, GridsThatShareATree) {
-  const auto first = stock_grid<openvdb::FloatGrid>("T_1", 0);
+  const auto first = stock_grid<openvdb::FloatGrid>("T_1");
   first->tree().setValue({1, 1, 1}, 3);
   openvdb::GridPtrVec grids{first};
   for (const int i : {0, 2, 3, 4, 5, 6, 7, 8}) {
@@ -273,8 +273,8 @@ TEST(TensorFiles, ChoosesAmongFieldsByName) {
   const Temporary path("a.vdb");
   openvdb::GridPtrVec grids = voxel_rows("A", 1), others = voxel_rows("B", 2);
   grids.insert(grids.end(), others.begin(), others.end());
-  grids.push_back(stock_grid<openvdb::FloatGrid>("density", 0));
-  grids.push_back(stock_grid<openvdb::BoolGrid>("mask", false));
+  grids.push_back(stock_grid<openvdb::FloatGrid>("density"));
+  grids.push_back(stock_grid<openvdb::BoolGrid>("mask"));
   write_stock(path, grids);
   EXPECT_EQ((*find(read_tensor_vdb(path, "B"), {0, 0, 0}))(0, 0), 2);
   EXPECT_EQ(tensor_names(list_vdb(path)), (std::vector<std::string>{"A", "B"}));
@@ -304,7 +304,7 @@ TEST(TensorFiles, RefusesDifferentTransformsAndFrustums) {
 /// A grid of `value(world)` at the voxels of a ball, so that every kind of edge occurs.
 template <class Grid, class Value>
 typename Grid::Ptr ball(const std::string& name, const openvdb::math::Transform::Ptr& transform, const Value& value) {
-  const auto grid = stock_grid<Grid>(name, openvdb::zeroVal<typename Grid::ValueType>());
+  const auto grid = stock_grid<Grid>(name);
   grid->setTransform(transform);
   for (int x = -9; x <= 9; ++x)
     for (int y = -9; y <= 9; ++y)

@@ -195,7 +195,7 @@ TEST(DamagedFiles, ReadsFormatsThatHoldUnknownGrids) {
   // An unknown type in the table of grids does not hide other grids: rename the type of an unrelated grid.
   const Temporary path("a.vdb");
   openvdb::GridPtrVec grids = voxel_rows("T");
-  grids.insert(grids.begin(), stock_grid<openvdb::Int32Grid>("other", 0));
+  grids.insert(grids.begin(), stock_grid<openvdb::Int32Grid>("other"));
   write_stock(path, grids);
   std::string bytes = bytes_of(path);
   const std::size_t at = bytes.find("Tree_int32_5_4_3");
@@ -229,7 +229,7 @@ TEST(DamagedFiles, VoxelsFarAwayAreRefused) {
   const Temporary path("far.vdb");
   for (const Case& each : cases)
     for (const Derive derive : {Derive::none, Derive::hessian}) {
-      const auto scalar = stock_grid<openvdb::FloatGrid>("phi", 0);
+      const auto scalar = stock_grid<openvdb::FloatGrid>("phi");
       openvdb::GridPtrVec grids{scalar};
       fill(*scalar, each, 1.0f);
       if (derive == Derive::none)
@@ -243,7 +243,7 @@ TEST(DamagedFiles, VoxelsFarAwayAreRefused) {
 
 /// Tiles take a few bytes in the file, and 2 GB each in memory.
 TEST(DamagedFiles, TilesThatFitInNoMemoryAreRefused) {
-  const auto grid = stock_grid<openvdb::FloatGrid>("phi", 0);
+  const auto grid = stock_grid<openvdb::FloatGrid>("phi");
   for (int i = 0; i < 4000; ++i)
     grid->tree().addTile(2, openvdb::Coord(128 * (i % 20), 128 * (i / 20 % 20), 128 * (i / 400)), 1.0f, true);
   const Temporary path("tiles.vdb");
