@@ -89,8 +89,8 @@ void set_attribute(PointLeaf& leaf, const std::string& name, const PointPlace* f
 /// OpenVDB's own conversion (PointConversion.h) takes a twentieth of the time to compile the whole program.
 /// @param edge  Of a voxel.
 openvdb::points::PointDataGrid::Ptr point_grid(const PointCloud& cloud, double edge) {
-  using Descriptor = openvdb::points::AttributeSet::Descriptor;
-  Descriptor::Ptr attributes = Descriptor::create(attribute_type<openvdb::Vec3f>());  // Its name is P.
+  using openvdb::points::AttributeSet;
+  auto attributes = AttributeSet::Descriptor::create(attribute_type<openvdb::Vec3f>());  // Its name is P.
   for (const auto& scalar : cloud.scalars)
     attributes = attributes->duplicateAppend(scalar.first, attribute_type<float>());
   for (const auto& vector : cloud.vectors)
@@ -103,7 +103,7 @@ openvdb::points::PointDataGrid::Ptr point_grid(const PointCloud& cloud, double e
     const auto count = static_cast<openvdb::Index>(end - begin);
     auto* const leaf = new PointLeaf(first->leaf);
     grid->tree().addLeaf(leaf);  // The tree owns it.
-    leaf->initializeAttributes(attributes, count);
+    leaf->replaceAttributeSet(new AttributeSet(attributes, count), /*allowMismatchingDescriptors=*/true);
     std::vector<PointLeaf::ValueType> ends(PointLeaf::SIZE);  // Of each voxel's points.
     for (openvdb::Index voxel = 0, i = 0; voxel < PointLeaf::SIZE; ++voxel) {
       while (i < count && first[i].voxel == voxel) ++i;
