@@ -90,12 +90,12 @@ void set_attribute(PointLeaf& leaf, const std::string& name, const PointPlace* f
 /// @param edge  Of a voxel.
 openvdb::points::PointDataGrid::Ptr point_grid(const PointCloud& cloud, double edge) {
   using openvdb::points::AttributeSet;
+  const auto grid = empty_grid<openvdb::points::PointDataGrid>();
   auto attributes = AttributeSet::Descriptor::create(attribute_type<openvdb::Vec3f>());  // Its name is P.
   for (const auto& scalar : cloud.scalars)
     attributes = attributes->duplicateAppend(scalar.first, attribute_type<float>());
   for (const auto& vector : cloud.vectors)
     attributes = attributes->duplicateAppend(vector.first, attribute_type<openvdb::Vec3f>());
-  const auto grid = empty_grid<openvdb::points::PointDataGrid>();
   const std::vector<PointPlace> places = places_of(cloud.positions, edge);
   for (std::size_t begin = 0, end = 0; begin < places.size(); begin = end) {
     while (end < places.size() && places[end].leaf == places[begin].leaf) ++end;

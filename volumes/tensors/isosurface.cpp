@@ -9,11 +9,11 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <openvdb/openvdb.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include "volumes/bricks/brick_layout.h"
 #include "volumes/sampling/tensor_sampler.h"
-#include "volumes/vdb/vdb_archive.h"
 
 namespace tensorray {
 namespace {
@@ -65,7 +65,9 @@ openvdb::FloatGrid::Ptr invariant_grid(const TensorField& field, const Voxels& b
   const auto brick_of = [](int index) { return index >> 3; };
   static_assert(TensorBrick::cells == 8, "a brick's index is a voxel's, less three bits");
   const Vector3i first = box.min().unaryExpr(brick_of), last = box.max().unaryExpr(brick_of);
-  const openvdb::FloatGrid::Ptr grid = empty_grid<openvdb::FloatGrid>();
+  openvdb::initialize();  // As empty_grid() of vdb_archive.h.
+  const auto grid =
+      openvdb::gridPtrCast<openvdb::FloatGrid>(openvdb::GridBase::createGrid(openvdb::FloatGrid::gridType()));
   openvdb::FloatGrid::Accessor accessor = grid->getAccessor();
   for (int x = first.x(); x <= last.x(); ++x)
     for (int y = first.y(); y <= last.y(); ++y)
