@@ -10,7 +10,8 @@
 namespace tensorray {
 namespace {
 
-constexpr std::size_t judged = 200000;  // Number of points that is enough to choose a range.
+constexpr std::size_t judged = 200000;   // Number of points that is enough to choose a range.
+constexpr std::size_t widest_line = 10;  // Letters in a line of a title, if its words allow it.
 
 double transverse_force(const PathPoint& point) {
   const Eigen::Vector3d force = point.force();
@@ -36,6 +37,17 @@ std::string title_of(const PathColorDescription& description, const FieldUnits& 
   if (by == PathColor::curvature) return units.length.empty() ? "|V'|" : "|V'|\n1/" + units.length;
   if (by == PathColor::invariant) return invariant_title(description.invariant, units);
   return choice_name(by) + ("\n" + units.length);
+}
+
+/// A title with breaks at spaces, so that a long unit does not make the legend wide.
+std::string narrow(std::string title) {
+  std::size_t start = 0;  // Of the line.
+  for (std::size_t i = 0; i < title.size(); ++i) {
+    const std::size_t end = std::min(title.find_first_of(" \n", i + 1), title.size());  // Of the next word.
+    if (title[i] == ' ' && end - start > widest_line) title[i] = '\n';
+    if (title[i] == '\n') start = i + 1;
+  }
+  return title;
 }
 
 ValueRange range_of(const PathColorDescription& description, const std::vector<Path>& paths,
@@ -159,7 +171,8 @@ PathColors direction_colors(const std::vector<Path>& paths) {
 SurfaceLegend bar_legend(const std::string& title, const ValueRange& range,
                          const std::function<Eigen::Vector3d(double)>& color) {
   return [=](Image& image, const Eigen::Matrix3d& from_rec709, const LegendPlace& place) {
-    draw_color_bar(image, {title, range, [&](double at) -> Eigen::Vector3d { return from_rec709 * color(at); }}, place);
+    draw_color_bar(image, {narrow(title), range, [&](double at) -> Eigen::Vector3d { return from_rec709 * color(at); }},
+                   place);
   };
 }
 

@@ -42,29 +42,92 @@ int segments_for(double radius, double tolerance, const TubeSettings& settings) 
   return static_cast<int>(std::clamp(wanted, double(settings.min_segments), double(settings.max_segments)));
 }
 
+/// A point, and how its x and y change per length, apart from their turn with the tube.
+struct Knot {
+  TubePoint point;
+  Eigen::Vector3d x_slope = Eigen::Vector3d::Zero(), y_slope = Eigen::Vector3d::Zero();
+};
+
+/// The slope at a point between two others: that of the parabola; but so much less that no extremum comes between two
+/// points (Fritsch and Carlson 1980, "Monotone Piecewise Cubic Interpolation").
+/// @param before, behind  Slopes of the straight lines to the neighbours, whose lengths are `h` and `k`.
+Eigen::Vector3d slope_between(const Eigen::Vector3d& before, double h, const Eigen::Vector3d& behind, double k) {
+  if (!(before.dot(behind) > 0)) return Eigen::Vector3d::Zero();
+  const Eigen::Vector3d slope = (k * before + h * behind) / (h + k);
+  const double greatest = 3 * std::min(before.norm(), behind.norm());
+  return slope.norm() > greatest ? Eigen::Vector3d(greatest * slope.normalized()) : slope;
+}
+
+/// A tube's points with their slopes. Those at the ends are of parabolas.
+std::vector<Knot> knots_of(const Tube& tube) {
+  std::vector<Knot> knots;
+  for (const TubePoint& point : tube) knots.push_back({point});
+  // From point i − 1 to point i, in the plane of point k, which is one of them.
+  const auto length = [&](std::size_t i) { return (tube[i].center - tube[i - 1].center).norm(); };
+  const auto chord = [&](auto member, std::size_t i, std::size_t k) -> Eigen::Vector3d {
+    const auto at = [&](std::size_t j) -> Eigen::Vector3d {
+      return turn_between(axis(tube[j]), axis(tube[k])) * (tube[j].*member);
+    };
+    return length(i) > 0 ? Eigen::Vector3d((at(i) - at(i - 1)) / length(i)) : Eigen::Vector3d::Zero();
+  };
+  const auto set = [&](auto member, auto slope) {
+    const std::size_t last = tube.size() - 1;
+    for (std::size_t i = 1; i < last; ++i)
+      knots[i].*slope = slope_between(chord(member, i, i), length(i), chord(member, i + 1, i), length(i + 1));
+    const auto end_slope = [&](std::size_t i, std::size_t end, std::size_t other) -> Eigen::Vector3d {
+      const Eigen::Vector3d mean = chord(member, i, end);
+      if (last == 1) return mean;
+      const Eigen::Quaterniond turn = turn_between(axis(tube[other]), axis(tube[end]));
+      const Eigen::Vector3d there = 2 * mean - turn * (knots[other].*slope);
+      return there.dot(mean) > 0 ? there : Eigen::Vector3d::Zero();
+    };
+    knots.front().*slope = end_slope(1, 0, 1);
+    knots.back().*slope = end_slope(last, last, last - 1);
+  };
+  set(&TubePoint::x, &Knot::x_slope);
+  set(&TubePoint::y, &Knot::y_slope);
+  return knots;
+}
+
 /// A point between two points of a tube. The centre is on the cubic that has the tube's direction at both points, with
-/// such a speed there that a circle's arc keeps its height. The ellipse turns with the direction.
-TubePoint between(const TubePoint& a, const TubePoint& b, double t) {
+/// such a speed there that a circle's arc keeps its height. The ellipse turns with the direction; its x and y are on
+/// the cubics with the slopes of both points.
+TubePoint between(const Knot& start, const Knot& end, double t) {
+  const TubePoint &a = start.point, &b = end.point;
   const Eigen::Vector3d from = axis(a), to = axis(b), chord = b.center - a.center;
   const double half_turn = std::sqrt(std::max(0.0, (1 + from.dot(to)) / 2));  // Its cosine.
   const double speed = chord.norm() * 2 / (1 + half_turn);
   const Eigen::Vector3d bulge = t * (1 - t) * (speed * ((1 - t) * from - t * to) - (1 - 2 * t) * chord);
   const Eigen::Quaterniond turn = turn_between(from, to);
   const Eigen::Quaterniond part = Eigen::Quaterniond::Identity().slerp(t, turn);
-  const auto mixed = [&](const Eigen::Vector3d& u, const Eigen::Vector3d& v) -> Eigen::Vector3d {
-    return part * ((1 - t) * u + t * (turn.conjugate() * v));
+  const auto mixed = [&](auto member, auto slope) -> Eigen::Vector3d {
+    const Eigen::Vector3d u = a.*member, change = turn.conjugate() * (b.*member) - u;
+    const Eigen::Vector3d at_start = chord.norm() * (start.*slope) - change;
+    const Eigen::Vector3d at_end = chord.norm() * (turn.conjugate() * (end.*slope)) - change;
+    return part * (u + t * change + t * (1 - t) * ((1 - t) * at_start - t * at_end));
   };
-  return {a.center + t * chord + bulge, mixed(a.x, b.x), mixed(a.y, b.y), (1 - t) * a.value + t * b.value,
-          (1 - t) * a.shade + t * b.shade};
+  return {a.center + t * chord + bulge, mixed(&TubePoint::x, &Knot::x_slope), mixed(&TubePoint::y, &Knot::y_slope),
+          (1 - t) * a.value + t * b.value, (1 - t) * a.shade + t * b.shade};
 }
 
-/// Distance between the straight surface that joins two rings and the tube.
-double deviation(const TubePoint& a, const TubePoint& b) {
-  const double turn = (axis(b) - axis(a)).norm();
-  return ((b.center - a.center).norm() + turn * std::max(max_radius(a), max_radius(b))) * turn / 8;
+/// Distance between the straight surface that joins two rings and the tube. Of what the cubics of x and y add, half, so
+/// that it may be all of the tolerance: by half of their second derivative, at the end where it is greater.
+double deviation(const Knot& start, const Knot& end) {
+  const TubePoint &a = start.point, &b = end.point;
+  const double turn = (axis(b) - axis(a)).norm(), length = (b.center - a.center).norm();
+  const Eigen::Quaterniond back = turn_between(axis(b), axis(a));
+  const auto bend = [&](auto member, auto slope) {
+    const Eigen::Vector3d change = back * (b.*member) - a.*member;
+    const Eigen::Vector3d u = length * (start.*slope) - change;
+    const Eigen::Vector3d v = length * (back * (end.*slope)) - change;
+    return std::max((2 * u + v).norm(), (u + 2 * v).norm());
+  };
+  const double swelling = std::max(bend(&TubePoint::x, &Knot::x_slope), bend(&TubePoint::y, &Knot::y_slope));
+  return ((length + turn * std::max(max_radius(a), max_radius(b))) * turn + swelling) / 8;
 }
 
-/// Leaves out rings that interpolation gives to half the tolerance, and adds rings where the curvature needs them.
+/// Leaves out rings that interpolation gives to half the tolerance, and adds rings where the curvature needs them, or
+/// the change of the ellipses.
 Tube adapted(const Tube& tube, double tolerance, double value_tolerance, double shade_tolerance) {
   const auto error = [&](std::size_t i, std::size_t j, std::size_t k) {
     const TubePoint &a = tube[i], &b = tube[j], &point = tube[k];
@@ -89,15 +152,16 @@ Tube adapted(const Tube& tube, double tolerance, double value_tolerance, double 
       if (const double each = error(i, j, k); !(each <= found.error)) found = {each, k};
     return found;
   };
-  Tube result;
-  for (const std::size_t i : thinned(tube.size(), worst)) {
-    if (!result.empty()) {
-      const TubePoint last = result.back();
-      const double wanted = std::ceil(std::sqrt(deviation(last, tube[i]) / (tolerance / 2)));
-      const int pieces = static_cast<int>(std::clamp(wanted, 1.0, double(max_pieces)));
-      for (int piece = 1; piece < pieces; ++piece) result.push_back(between(last, tube[i], double(piece) / pieces));
-    }
-    result.push_back(tube[i]);
+  Tube kept;
+  for (const std::size_t i : thinned(tube.size(), worst)) kept.push_back(tube[i]);
+  const std::vector<Knot> knots = knots_of(kept);
+  Tube result{kept[0]};
+  for (std::size_t i = 1; i < kept.size(); ++i) {
+    const double wanted = std::ceil(std::sqrt(deviation(knots[i - 1], knots[i]) / (tolerance / 2)));
+    const int pieces = static_cast<int>(std::clamp(wanted, 1.0, double(max_pieces)));
+    for (int piece = 1; piece < pieces; ++piece)
+      result.push_back(between(knots[i - 1], knots[i], double(piece) / pieces));
+    result.push_back(kept[i]);
   }
   return result;
 }
@@ -108,6 +172,7 @@ Tube spaced(const Tube& tube, double spacing) {
   for (std::size_t i = 1; i < tube.size(); ++i)
     lengths.push_back(lengths.back() + (tube[i].center - tube[i - 1].center).norm());
   const double pieces = std::max(1.0, std::round(lengths.back() / spacing));
+  const std::vector<Knot> knots = knots_of(tube);
   Tube result;
   std::size_t next = 1;
   for (double piece = 0; piece <= pieces; ++piece) {
@@ -115,7 +180,7 @@ Tube spaced(const Tube& tube, double spacing) {
     while (next + 1 < tube.size() && lengths[next] < at) ++next;
     const double gap = lengths[next] - lengths[next - 1];
     const double t = gap > 0 ? std::clamp((at - lengths[next - 1]) / gap, 0.0, 1.0) : 1;
-    result.push_back(between(tube[next - 1], tube[next], t));
+    result.push_back(between(knots[next - 1], knots[next], t));
   }
   return result;
 }

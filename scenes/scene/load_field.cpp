@@ -103,13 +103,25 @@ FieldUnits units_in(const std::map<std::string, std::string>& metadata) {
   return {entry("tensorray:world_unit"), entry("tensorray:units"), entry("tensorray:world_axes") == "RAS"};
 }
 
+/// A tensor's unit "X/length" or "X/length^2" with the unit of lengths in place of that word, if it is known. A length
+/// in X cancels: (m/s)/m is 1/s.
+std::string with_length(const std::string& unit, const std::string& length) {
+  const std::string word = "/length";
+  const std::size_t at = unit.rfind(word);
+  if (length.empty() || at == std::string::npos) return unit;
+  const std::string of = unit.substr(0, at), power = unit.substr(at + word.size());
+  if (!power.empty() && power != "^2") return unit;
+  if (power.empty() && (of == length || of.rfind(length + "/", 0) == 0)) return "1" + of.substr(length.size());
+  return of + "/" + length + power;
+}
+
 }  // namespace
 
 FieldUnits units_of(const Scene& scene) {
   const SceneDescription& description = scene.description;
   FieldUnits units = scene.file_units;
   if (!description.world.unit.empty()) units.length = description.world.unit;
-  if (description.field.derive != Derive::none) units.tensor.clear();  // The file's is that of what is derived.
+  units.tensor = with_length(units.tensor, units.length);
   if (!description.field.unit.empty()) units.tensor = description.field.unit;
   return units;
 }

@@ -178,8 +178,28 @@ TEST(Annotations, KnowTheUnitsOfAScene) {
   EXPECT_EQ(units(Json::object(), Json::object()).tensor, "mm^2/s");
   EXPECT_TRUE(units(Json::object(), {{"up", "y"}}).is_anatomical);
   EXPECT_EQ(units({{"unit", "MPa"}}, {{"unit", "in"}}).tensor, "MPa");
-  EXPECT_EQ(units({{"derive", "viscous_stress"}}, {{"unit", "in"}}).tensor, "");
+  EXPECT_EQ(units({{"derive", "viscous_stress"}}, {{"unit", "in"}}).tensor, "mm^2/s");
   EXPECT_EQ(units({{"unit", "MPa"}}, {{"unit", "in"}}).length, "in");
+}
+
+/// A gradient has the unit of its vector by that of lengths, and a stress of viscosity 1 that of its gradient.
+TEST(Annotations, KnowTheUnitsOfDerivatives) {
+  const TemporaryFolder folder;
+  const auto unit = [&](const std::string& of_vector, const char* derive, const char* length) {
+    TensorGrid grid = generate(Helix{}, default_grid(Helix{}, 9));
+    grid.metadata["tensorray:units"] = of_vector;
+    write_tensor_vdb(folder / "field.vdb", grid);
+    const std::string row = grid.name + "_row0";
+    const Json field{{"file", (folder / "field.vdb").string()}, {"scale", 1}, {"name", row}, {"derive", derive}};
+    const Json json{{"field", field}, {"world", {{"unit", length}}}, {"integrator", {{"type", "stretch"}}}};
+    return units_of(load_scene(read_scene_json(json, "scene.json"), Progress())).tensor;
+  };
+  EXPECT_EQ(unit("m/s", "gradient", "m"), "1/s");
+  EXPECT_EQ(unit("m/s", "-viscous_stress", "m"), "1/s");
+  EXPECT_EQ(unit("m/s", "viscous_stress", "mm"), "m/s/mm");
+  EXPECT_EQ(unit("mm", "gradient", "mm"), "1");
+  EXPECT_EQ(unit("mm^2/s", "gradient", "mm"), "mm^2/s/mm");
+  EXPECT_EQ(unit("m/s", "gradient", ""), "m/s/length");
 }
 
 /// Pixels of a plate have its size / resolution, those of a camera its height / resolution.

@@ -47,6 +47,7 @@ struct FlowPiece {
   std::vector<Triangle> triangles;
   std::vector<Edge> edges;  ///< The sides of the triangles, once.
   bool always_lands = true;
+  bool has_torn = false;
   std::vector<Eigen::Vector2f> landings;  ///< At [sample · vertices.size() + i].
 };
 
@@ -169,6 +170,7 @@ class PieceBuilder {
     for (std::size_t i = 0; i < 3; ++i) added.corners[i] = vertex(piece, triangle.corners[i]);
     added.area = triangle.area;
     added.is_torn = triangle.is_torn;
+    result_[piece].has_torn = result_[piece].has_torn || triangle.is_torn;
     result_[piece].area += triangle.area;
     result_[piece].triangles.push_back(added);
   }
@@ -251,6 +253,13 @@ struct BandRun {
 using PowerSums = std::vector<std::array<std::uint64_t, ray_end_count>>;
 constexpr double power_unit = 18014398509481984.0;
 
+/// Light of broken triangles that lands at a vertex, and the number of whole triangles that get it. (A triangle is
+/// whole if all of it lands, and the map does not jump within it.)
+struct CornerLight {
+  double power = 0;
+  int triangles = 0;
+};
+
 /// A thread's part of a pass.
 struct Worker {
   AreaDeposit deposit;
@@ -260,6 +269,7 @@ struct Worker {
   Eigen::AlignedBox2d box{};     // Of the landings, if all of them are on the plate's plane.
   bool is_all_on_plate = false;  // Whether all light of the piece lands on the plate.
   std::vector<double> densities{};
+  std::vector<CornerLight> corners{};  // Of a piece's vertices; empty if all its triangles are whole.
 };
 
 struct Drawing {
@@ -318,29 +328,54 @@ void set_landings(const Drawing& drawing, const FlowPiece& piece, double sample,
 /// Power by the end of its light.
 using Power = std::array<double, ray_end_count>;
 
-/// The density of a triangle for its edges. Light that is not spread over an area is added here.
-/// @param carried  Its power.
+bool is_whole(const FlowPiece& piece, const FlowPiece::Triangle& triangle, const Worker& worker) {
+  const auto [a, b, c] = triangle.corners;
+  const auto landed = [&](std::uint16_t corner) { return piece.always_lands || worker.ends[corner] == RayEnd::plate; };
+  const std::vector<Eigen::Vector2d>& at = worker.at;
+  return landed(a) && landed(b) && landed(c) && !jumps(triangle.is_torn, at[a], at[b], at[c]);
+}
+
+/// Finds the light of broken triangles: each corner has a third, which whole triangles beside it get. In a pixel of its
+/// own it would be a bright dot wherever the light around it is spread far. Only without such triangles it is added
+/// here, as a point.
+void share_corners(const Drawing& drawing, const FlowPiece& piece, double unit, Worker& worker, Power& power) {
+  worker.corners.clear();
+  if (piece.always_lands && !piece.has_torn) return;
+  worker.corners.resize(piece.vertices.size());
+  for (const FlowPiece::Triangle& triangle : piece.triangles) {
+    const bool whole = is_whole(piece, triangle, worker);
+    const double third = unit * triangle.area / 3;
+    for (const std::uint16_t corner : triangle.corners)
+      if (whole)
+        ++worker.corners[corner].triangles;
+      else if (piece.always_lands || worker.ends[corner] == RayEnd::plate)
+        worker.corners[corner].power += third;
+      else
+        power[static_cast<int>(worker.ends[corner])] += third;
+  }
+  for (std::size_t i = 0; i < worker.corners.size(); ++i) {
+    const CornerLight& light = worker.corners[i];
+    if (light.triangles > 0 || light.power == 0) continue;
+    power[static_cast<int>(is_on_plate(worker.at[i], drawing.plate) ? RayEnd::plate : RayEnd::missed)] += light.power;
+    worker.deposit.add_point(worker.at[i], light.power);
+  }
+}
+
+/// The density of a triangle for its edges; 0 if it is broken.
+/// @param carried  Its own power.
 double start_triangle(const Drawing& drawing, const FlowPiece& piece, const FlowPiece::Triangle& triangle,
                       double carried, Worker& worker, Power& power) {
+  if (!worker.corners.empty()) {
+    if (!is_whole(piece, triangle, worker)) return 0;
+    for (const std::uint16_t corner : triangle.corners)
+      carried += worker.corners[corner].power / worker.corners[corner].triangles;
+  }
   const auto [a, b, c] = triangle.corners;
   const std::vector<Eigen::Vector2d>& at = worker.at;
-  const auto landed = [&](std::uint16_t corner) { return piece.always_lands || worker.ends[corner] == RayEnd::plate; };
-  const auto count = [&](RayEnd end, double part) { power[static_cast<int>(end)] += part * carried; };
-  if (landed(a) && landed(b) && landed(c) && !jumps(triangle.is_torn, at[a], at[b], at[c])) {
-    const double on_plate = worker.is_all_on_plate ? 1 : part_on_plate(at[a], at[b], at[c], drawing.plate);
-    count(RayEnd::plate, on_plate);
-    count(RayEnd::missed, 1 - on_plate);
-    return worker.deposit.triangle(at[a], at[b], at[c], carried);
-  }
-  for (const std::uint16_t corner : triangle.corners) {
-    if (!landed(corner)) {
-      count(worker.ends[corner], 1.0 / 3);
-      continue;
-    }
-    count(is_on_plate(at[corner], drawing.plate) ? RayEnd::plate : RayEnd::missed, 1.0 / 3);
-    worker.deposit.add_point(at[corner], carried / 3);
-  }
-  return 0;
+  const double on_plate = worker.is_all_on_plate ? 1 : part_on_plate(at[a], at[b], at[c], drawing.plate);
+  power[static_cast<int>(RayEnd::plate)] += on_plate * carried;
+  power[static_cast<int>(RayEnd::missed)] += (1 - on_plate) * carried;
+  return worker.deposit.triangle(at[a], at[b], at[c], carried);
 }
 
 /// Gives the two triangles of a quad one density if theirs are nearly the same, so that the edge between them need not
@@ -368,6 +403,7 @@ void draw_piece(const Drawing& drawing, const FlowPiece& piece, double sample, d
   worker.is_all_on_plate = piece.always_lands && plate.contains(worker.box);
   std::vector<double>& densities = worker.densities;
   densities.clear();
+  share_corners(drawing, piece, unit, worker, power);
   for (const FlowPiece::Triangle& triangle : piece.triangles)
     densities.push_back(start_triangle(drawing, piece, triangle, unit * triangle.area, worker, power));
   for (const FlowPiece::Edge& edge : piece.edges)

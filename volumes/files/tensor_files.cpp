@@ -59,6 +59,14 @@ std::map<std::string, std::string> metadata_of(const openvdb::MetaMap& file, con
   return metadata;
 }
 
+/// What is derived from a grid has the unit of its values, for each unit of length. A unit of the whole file may be
+/// that of another grid.
+void derive_unit(const openvdb::GridBase& grid, Derive derive, std::map<std::string, std::string>& metadata) {
+  const openvdb::Metadata::ConstPtr unit = grid["tensorray:units"];
+  metadata.erase("tensorray:units");
+  if (unit) metadata["tensorray:units"] = text_of(*unit) + (derive == Derive::hessian ? "/length^2" : "/length");
+}
+
 std::vector<GridInfo> infos_of(const VdbFile& file) {
   std::vector<GridInfo> infos;
   for (const VdbGrid& grid : file.grids) {
@@ -283,6 +291,7 @@ BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string
   result.to_world = common_transform(path, grids);
   result.metadata = metadata_of(file.metadata, *grids.front().file.grid);
   const bool derives = field.derive != Derive::none;
+  if (derives) derive_unit(*grids.front().file.grid, field.derive, result.metadata);
   try {
     result.surface = read_surface(path, file, field.name, result.to_world);
     result.shapes = find_blocks(path, grids, derives ? sizeof(SampleBlock) : min_brick_bytes);

@@ -18,7 +18,8 @@ namespace tensorray {
 /// @param name  Empty: the only tensor (or, with `derive`, the only suitable grid) in the file.
 /// @param components  The grids that are the components; empty: they are found by their names.
 /// @return the blocks, with the surface, and the file's metadata as text. Entries `tensorray:...` that the file lacks
-/// are taken from the first grid. Values that are not finite are kept: see remove_non_finite.
+/// are taken from the first grid. `tensorray:units` of derivatives is the first grid's with "/length" or "/length^2"; a
+/// stress has the unit of its gradient. Values that are not finite are kept: see remove_non_finite.
 /// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, no such field
 /// (the message lists the grids of the file), several fields and no name, rows with different transforms, a transform
 /// that is not affine, no active voxel, levels that do not fit to each other. Damage within the values of voxels shows

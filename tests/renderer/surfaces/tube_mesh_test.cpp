@@ -172,6 +172,38 @@ TEST(TubeMesh, RingsAreAddedWhereATubeBends) {
             4 * solid(arc(r, pi / 2, 4), TubeCaps::flat, 0.02).mesh.triangles.size());
 }
 
+TEST(TubeMesh, WidthsBetweenPointsAreSmooth) {
+  // A tube that swells, given by a few points: widths are off by the third power of their distance, not the second.
+  const auto radius = [](double z) { return 0.1 + 0.05 * std::tanh(3 * z - 1); };
+  const auto greatest_error = [&](int points) {
+    Tube tube = straight_tube(1, 1, 1, points);
+    for (TubePoint& point : tube) {
+      point.x *= radius(point.center.z());
+      point.y *= radius(point.center.z());
+    }
+    double error = 0;
+    const TriangleMesh mesh = solid(tube, TubeCaps::open, 1e-6).mesh;
+    for (const auto& t : mesh.triangles) {
+      // The side from a ring to the next one that runs along the tube.
+      const Vector3d middle = (mesh.vertices[t[0]] + mesh.vertices[t[2]]) / 2;
+      const bool runs_along = std::abs(mesh.vertices[t[0]].cross(mesh.vertices[t[2]]).z()) < 1e-9;
+      if (runs_along) error = std::max(error, std::abs(middle.head<2>().norm() - radius(middle.z())));
+    }
+    return error;
+  };
+  EXPECT_LT(greatest_error(9), 2e-4);
+  EXPECT_GT(std::log2(greatest_error(17) / greatest_error(33)), 2.7);
+}
+
+TEST(TubeMesh, WidthsDoNotOvershoot) {
+  Tube tube = straight_tube(0.1, 0.1, 1, 11);
+  for (std::size_t i = 5; i < tube.size(); ++i) tube[i].x *= 9, tube[i].y *= 9;
+  for (const Vector3d& p : solid(tube, TubeCaps::open, 1e-4).mesh.vertices) {
+    EXPECT_GT(p.head<2>().norm(), 0.1 - 1e-12);
+    EXPECT_LT(p.head<2>().norm(), 0.9 + 1e-12);
+  }
+}
+
 TEST(TubeMesh, RingsThatOthersImplyAreLeftOutButValuesAreKept) {
   Tube tube = straight_tube(0.1, 0.1, 1, 1001);
   const std::size_t plain = solid(tube).mesh.vertices.size();

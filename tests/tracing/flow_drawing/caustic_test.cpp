@@ -160,6 +160,19 @@ TEST(Caustic, ASpectrumHasItsClosedFormWhateverItsEndsMeet) {
   }
 }
 
+/// Light that is spread far beside a shadow. What lands of the triangles between both is in no pixels of its own.
+TEST(Caustic, LightBesideAShadowMakesNoDots) {
+  FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(2 + 60 * at.x(), 2 + 60 * at.y()); });
+  for (std::size_t i = 0; i < map.starts.size(); ++i)
+    if (map.starts[i].x() > 0.9) map.ends[i] = RayEnd::obstacle;
+  const Caustic caustic = draw_caustic(map, unit_plate(), {CausticBand{}}, {}, Progress());
+  EXPECT_NEAR(power_of(caustic, RayEnd::obstacle), 1.0 / 16, 1e-12);  // Half of a column of quads.
+  EXPECT_NEAR(power_of(caustic, RayEnd::plate), 15.0 / 16, 1e-12);
+  EXPECT_NEAR(sum(caustic.irradiance.values) * unit_plate().pixel_area(), 15.0 / 16, 1e-9);
+  const double brightest = *std::max_element(caustic.irradiance.values.begin(), caustic.irradiance.values.end());
+  EXPECT_LT(brightest * unit_plate().pixel_area(), 2.1 / (60 * 60));
+}
+
 /// Light of a wavelength that nobody sees has power, too.
 TEST(Caustic, LightWithoutColourHasPower) {
   const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 48));

@@ -365,6 +365,23 @@ TEST(TensorFiles, ViscousStressIsThatOfAVelocityOrOfItsGradient) {
     }
 }
 
+TEST(TensorFiles, DerivativesHaveTheUnitOfTheirGridByLength) {
+  const Temporary path("a.vdb");
+  const openvdb::GridPtrVec rows = voxel_rows("T");
+  const auto unit = [&] {
+    openvdb::MetaMap of_file;
+    of_file.insertMeta("tensorray:units", openvdb::StringMetadata("Pa"));
+    openvdb::io::File(path.string()).write(rows, of_file);
+    const auto metadata = read_tensor_vdb(path, "T_row0", Derive::gradient).metadata;
+    return metadata.count("tensorray:units") ? metadata.at("tensorray:units") : "none";
+  };
+  EXPECT_EQ(unit(), "none");  // The file's may be that of another grid.
+  rows[0]->insertMeta("tensorray:units", openvdb::StringMetadata("m/s"));
+  EXPECT_EQ(unit(), "m/s/length");
+  EXPECT_EQ(read_tensor_vdb(path, "T_row0", Derive::viscous_stress).metadata.at("tensorray:units"), "m/s/length");
+  EXPECT_EQ(read_tensor_vdb(path, "T", Derive::viscous_stress).metadata.at("tensorray:units"), "Pa");
+}
+
 TEST(TensorFiles, HessianOfAQuadraticIsExactInWorldAxes) {
   Matrix3d second;
   second << 2, 1, -0.5, 1, -3, 0.25, -0.5, 0.25, 1;
