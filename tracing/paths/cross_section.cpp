@@ -1,7 +1,6 @@
 #include "tracing/paths/cross_section.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include <Eigen/Eigenvalues>
@@ -35,23 +34,7 @@ Basis circle_basis(const Eigen::Matrix3d& T, const Eigen::Vector3d& V) {
   return stretches.eigenvectors().rightCols<2>();
 }
 
-/// `length`, or nearly `least` where it is less: from 0 to `least` + `width` it bends, without a jump of curvature.
-double raised(double length, double least, double width) {
-  if (length >= least + width) return length;
-  if (length <= least - width) return least;
-  const double u = 1 + (length - least) / width;
-  return least + width / 16 * u * u * u * (4 - u);
-}
-
-/// `size`, or less above `knee`, and always less than `greatest`. Its curvature has no jump.
-double lowered(double size, double knee, double greatest) {
-  if (size <= knee) return size;
-  return knee + (greatest - knee) * ((size - knee) / std::hypot(size - knee, greatest - knee));
-}
-
-/// An ellipse within the limits: unit semi-axes and their lengths, the longer one first. The limits are soft, and the
-/// size of an ellipse is √(a² + b²): corners of these functions, also that of max(a, b), would be corners of a tube's
-/// outline.
+/// A clamped ellipse: unit semi-axes and their lengths, the longer one first.
 struct Clamped {
   Eigen::Vector3d major, minor;
   double major_length, minor_length;
@@ -59,16 +42,14 @@ struct Clamped {
 
 Clamped clamped(const Basis& axes, const Eigen::Vector3d& V, const CrossSectionSettings& settings) {
   const double longer = settings.scale * axes.col(0).norm(), shorter = settings.scale * axes.col(1).norm();
-  const double least = settings.min_radius, greatest = settings.max_radius, size = std::hypot(longer, shorter);
-  const double shrink = size > 0 ? lowered(size, std::max(least, greatest / 2), greatest) / size : 1;
-  const double width = std::min(least, (greatest - least) / 2);
+  const double shrink = longer > settings.max_radius ? settings.max_radius / longer : 1;
   Clamped result;
   const Eigen::Vector3d across = axes.col(0) - V.dot(axes.col(0)) * V;
   // An ellipse of size zero becomes a circle, of which any diameter is an axis.
   result.major = across.norm() > 0 ? Eigen::Vector3d(across.normalized()) : upright(V, Eigen::Vector3d::UnitY());
   result.minor = V.cross(result.major);
-  result.major_length = raised(shrink * longer, least, width);
-  result.minor_length = raised(shrink * shorter, least, width);
+  result.major_length = std::max(shrink * longer, settings.min_radius);
+  result.minor_length = std::max(shrink * shorter, settings.min_radius);
   return result;
 }
 

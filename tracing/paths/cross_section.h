@@ -9,14 +9,9 @@ namespace tensorray {
 
 /// How the ellipse of a tensor becomes the cross section of a tube.
 struct CrossSectionSettings {
-  double scale = 1;  ///< World units per unit of T; > 0.
-
-  /// World units; >= min_radius. No semi-axis is longer: an ellipse of more than half this size, √(a² + b²), is smaller
-  /// than T says, and keeps its shape.
-  double max_radius = 1e300;
-  /// World units; > 0. No semi-axis is shorter, so that degenerate ellipses stay visible: those up to twice as long are
-  /// longer than T says. Both limits are smooth functions of T.
-  double min_radius = 0;
+  double scale = 1;           ///< World units per unit of T; > 0.
+  double min_radius = 0;      ///< World units; no semi-axis is shorter, so that degenerate ellipses stay visible; > 0.
+  double max_radius = 1e300;  ///< World units; larger ellipses shrink to it and keep their shape; >= min_radius.
 };
 
 /// An ellipse about a point of a path, in the plane normal to the path. It has two pairs of spanning vectors, for two
