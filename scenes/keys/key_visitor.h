@@ -114,15 +114,9 @@ class MemberOf final : public KeyMember {
 };
 
 // Of many structs: compiled once, in section_reader.cpp.
-extern template class MemberOf<bool>;
 extern template class MemberOf<int>;
-extern template class MemberOf<std::size_t>;
 extern template class MemberOf<double>;
 extern template class MemberOf<std::optional<double>>;
-extern template class MemberOf<std::string>;
-extern template class MemberOf<std::filesystem::path>;
-extern template class MemberOf<Eigen::Vector3d>;
-extern template class MemberOf<std::optional<Eigen::Vector2d>>;
 extern template class MemberOf<std::optional<Eigen::Vector3d>>;
 
 class KeyVisitor {

@@ -12,15 +12,9 @@
 
 namespace tensorray {
 
-template class MemberOf<bool>;
 template class MemberOf<int>;
-template class MemberOf<std::size_t>;
 template class MemberOf<double>;
 template class MemberOf<std::optional<double>>;
-template class MemberOf<std::string>;
-template class MemberOf<std::filesystem::path>;
-template class MemberOf<Eigen::Vector3d>;
-template class MemberOf<std::optional<Eigen::Vector2d>>;
 template class MemberOf<std::optional<Eigen::Vector3d>>;
 
 namespace {

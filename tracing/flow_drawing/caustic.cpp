@@ -345,18 +345,22 @@ void share_corners(const Drawing& drawing, const FlowPiece& piece, double unit, 
   for (const FlowPiece::Triangle& triangle : piece.triangles) {
     const bool whole = is_whole(piece, triangle, worker);
     const double third = unit * triangle.area / 3;
-    for (const std::uint16_t corner : triangle.corners)
+    for (const std::uint16_t corner : triangle.corners) {
+      const RayEnd end = piece.always_lands ? RayEnd::plate : worker.ends[corner];
       if (whole)
         ++worker.corners[corner].triangles;
-      else if (piece.always_lands || worker.ends[corner] == RayEnd::plate)
+      else if (end != RayEnd::plate)
+        power[static_cast<int>(end)] += third;
+      else if (is_on_plate(worker.at[corner], drawing.plate))
         worker.corners[corner].power += third;
-      else
-        power[static_cast<int>(worker.ends[corner])] += third;
+      else  // Triangles beside the plate are large: their light must not come onto it.
+        power[static_cast<int>(RayEnd::missed)] += third;
+    }
   }
   for (std::size_t i = 0; i < worker.corners.size(); ++i) {
     const CornerLight& light = worker.corners[i];
     if (light.triangles > 0 || light.power == 0) continue;
-    power[static_cast<int>(is_on_plate(worker.at[i], drawing.plate) ? RayEnd::plate : RayEnd::missed)] += light.power;
+    power[static_cast<int>(RayEnd::plate)] += light.power;
     worker.deposit.add_point(worker.at[i], light.power);
   }
 }

@@ -45,7 +45,7 @@ struct CausticSettings {
 /// Draws each triangle once for each `step` by which its light moves, from the first band to the last. Where light
 /// moves little and always ends on the same thing, several bands in a row are drawn as one; where it moves far, a
 /// band is drawn at most 16 times (6, if it does not always end on the same thing). If not all corners of a triangle
-/// land, each corner takes a third of the light. That of a corner that lands is spread over the triangles beside it
+/// land, each corner takes a third of the light. That of a corner on the plate is spread over the triangles beside it
 /// that land, or if there are none, it is in the pixel where the corner lands. So is that of small triangles at a tear.
 /// What lands beside the plate counts as missed.
 /// @param plate  The plate of the map.

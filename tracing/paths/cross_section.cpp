@@ -1,6 +1,7 @@
 #include "tracing/paths/cross_section.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include <Eigen/Eigenvalues>
@@ -34,7 +35,30 @@ Basis circle_basis(const Eigen::Matrix3d& T, const Eigen::Vector3d& V) {
   return stretches.eigenvectors().rightCols<2>();
 }
 
-/// A clamped ellipse: unit semi-axes and their lengths, the longer one first.
+// Where the limits begin to bend sizes, as parts of the greatest and of the least one.
+constexpr double bent_from = 0.6, bent_to = 1.25;
+
+/// `length`, or nearly `least` where it is less: from 0 to `least` + `width` it bends, without a jump of curvature.
+double raised(double length, double least, double width) {
+  if (length >= least + width) return length;
+  if (length <= least - width) return least;
+  const double u = 1 + (length - least) / width;
+  return least + width / 16 * u * u * u * (4 - u);
+}
+
+/// `size`, or less above `knee`, and always less than `greatest`. Its curvature has no jump.
+double lowered(double size, double knee, double greatest) {
+  if (size <= knee) return size;
+  return knee + (greatest - knee) * ((size - knee) / std::hypot(size - knee, greatest - knee));
+}
+
+/// Nearly the longer semi-axis, but without a corner where the axes change places.
+double size_of(double longer, double shorter) {
+  return longer > 0 ? longer * std::pow(1 + std::pow(shorter / longer, 4), 0.25) : 0;
+}
+
+/// An ellipse within the limits: unit semi-axes and their lengths, the longer one first. The limits are a little soft,
+/// as corners of these functions would be corners of a tube's outline.
 struct Clamped {
   Eigen::Vector3d major, minor;
   double major_length, minor_length;
@@ -42,14 +66,16 @@ struct Clamped {
 
 Clamped clamped(const Basis& axes, const Eigen::Vector3d& V, const CrossSectionSettings& settings) {
   const double longer = settings.scale * axes.col(0).norm(), shorter = settings.scale * axes.col(1).norm();
-  const double shrink = longer > settings.max_radius ? settings.max_radius / longer : 1;
+  const double least = settings.min_radius, greatest = settings.max_radius, size = size_of(longer, shorter);
+  const double shrink = size > 0 ? lowered(size, std::max(least, bent_from * greatest), greatest) / size : 1;
+  const double width = std::min((bent_to - 1) * least, (greatest - least) / 2);
   Clamped result;
   const Eigen::Vector3d across = axes.col(0) - V.dot(axes.col(0)) * V;
   // An ellipse of size zero becomes a circle, of which any diameter is an axis.
   result.major = across.norm() > 0 ? Eigen::Vector3d(across.normalized()) : upright(V, Eigen::Vector3d::UnitY());
   result.minor = V.cross(result.major);
-  result.major_length = std::max(shrink * longer, settings.min_radius);
-  result.minor_length = std::max(shrink * shorter, settings.min_radius);
+  result.major_length = raised(shrink * longer, least, width);
+  result.minor_length = raised(shrink * shorter, least, width);
   return result;
 }
 

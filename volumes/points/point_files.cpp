@@ -45,11 +45,6 @@ using PointLeaf = openvdb::points::PointDataTree::LeafNodeType;
 
 openvdb::Vec3f to_openvdb(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z()}; }
 
-template <class Value>
-openvdb::NamePair attribute_type() {
-  return openvdb::points::TypedAttributeArray<Value>::attributeType();
-}
-
 /// Where a point is in the tree.
 struct PointPlace {
   openvdb::Coord leaf;  ///< Its origin.
@@ -91,11 +86,11 @@ void set_attribute(PointLeaf& leaf, const std::string& name, const PointPlace* f
 openvdb::points::PointDataGrid::Ptr point_grid(const PointCloud& cloud, double edge) {
   using openvdb::points::AttributeSet;
   const auto grid = empty_grid<openvdb::points::PointDataGrid>();
-  auto attributes = AttributeSet::Descriptor::create(attribute_type<openvdb::Vec3f>());  // Its name is P.
-  for (const auto& scalar : cloud.scalars)
-    attributes = attributes->duplicateAppend(scalar.first, attribute_type<float>());
-  for (const auto& vector : cloud.vectors)
-    attributes = attributes->duplicateAppend(vector.first, attribute_type<openvdb::Vec3f>());
+  const auto vector = openvdb::points::TypedAttributeArray<openvdb::Vec3f>::attributeType();
+  const auto scalar = openvdb::points::TypedAttributeArray<float>::attributeType();
+  auto attributes = AttributeSet::Descriptor::create(vector);  // Its name is P.
+  for (const auto& list : cloud.scalars) attributes = attributes->duplicateAppend(list.first, scalar);
+  for (const auto& list : cloud.vectors) attributes = attributes->duplicateAppend(list.first, vector);
   const std::vector<PointPlace> places = places_of(cloud.positions, edge);
   for (std::size_t begin = 0, end = 0; begin < places.size(); begin = end) {
     while (end < places.size() && places[end].leaf == places[begin].leaf) ++end;

@@ -73,11 +73,36 @@ TEST(CrossSection, DegenerateTensorsKeepAVisibleRadius) {
   const PathPoints points{point_of({0, 0, 0}, V, Matrix3d::Zero()), point_of({0, 0, 1}, V, rank_one),
                           point_of({0, 0, 2}, V, Matrix3d::Zero()), point_of({0, 0, 3}, V, 1e150 * annihilated)};
   const std::vector<CrossSection> sections = cross_sections(points, radii(0.1, 0.5));
-  const double major[] = {0.1, 0.5, 0.1, 0.5}, minor[] = {0.1, 0.1, 0.1, 0.375};
+  const double round = 0.5 / std::pow(1 + std::pow(0.75, 4), 0.25);  // Far too large: as near to 0.5 as it gets.
+  const double major[] = {0.1, 0.3 + 0.2 * 8.5 / std::hypot(8.5, 1), 0.1, round},
+               minor[] = {0.1, 0.1, 0.1, 0.75 * round};
   for (int i = 0; i < 4; ++i) {
     EXPECT_NEAR(sections[i].major.norm(), major[i], 1e-12);
     EXPECT_NEAR(sections[i].minor.norm(), minor[i], 1e-12);
   }
+}
+
+TEST(CrossSection, LimitsHaveNoCorners) {
+  // From nothing to far beyond the greatest radius; the axes change places on the way. The slopes of both widths are
+  // continuous: their jumps between steps get smaller with the steps.
+  const auto greatest_jump = [](int count) {
+    const PathPoints points =
+        straight_way(count, [](double z) -> Matrix3d { return Vector3d(0.01 + 3 * z * z, z - 0.2, 1).asDiagonal(); });
+    const std::vector<CrossSection> s = cross_sections(points, radii(0.1, 0.5));
+    double jump = 0;
+    for (std::size_t i = 1; i + 1 < s.size(); ++i) {
+      const auto extent = [&](std::size_t k, int axis) { return std::hypot(s[k].x[axis], s[k].y[axis]); };
+      for (const int axis : {0, 1})
+        jump = std::max(jump, std::abs(extent(i + 1, axis) - 2 * extent(i, axis) + extent(i - 1, axis)) * count);
+      EXPECT_LT(s[i].major.norm(), 0.5);
+      EXPECT_GE(s[i].minor.norm(), 0.1);
+    }
+    return jump;
+  };
+  EXPECT_NEAR(greatest_jump(2001) / greatest_jump(1001), 0.5, 0.05);
+  // Sizes between the limits are true.
+  const PathPoints round = straight_way(2, [](double) -> Matrix3d { return 0.3 * Matrix3d::Identity(); });
+  EXPECT_NEAR(cross_sections(round, radii(0.1, 1)).front().major.norm(), 0.3, 1e-12);
 }
 
 TEST(CrossSection, BothPairsOfVectorsSpanTheSameEllipse) {
