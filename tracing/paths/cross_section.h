@@ -10,12 +10,10 @@ namespace tensorray {
 /// How the ellipse of a tensor becomes the cross section of a tube.
 struct CrossSectionSettings {
   double scale = 1;  ///< World units per unit of T; > 0.
-
-  /// World units; >= min_radius. No semi-axis is longer: larger ellipses shrink to it and keep their shape.
-  double max_radius = 1e300;
   /// World units; > 0. No semi-axis is shorter, so that degenerate ellipses stay visible. Both limits are smooth
-  /// functions of T, and change also semi-axes from half of the greatest one, and up to 1.25 of the least one.
+  /// functions of T, and change also semi-axes up to 1.25 of the least one, and from half of the greatest one.
   double min_radius = 0;
+  double max_radius = 1e300;  ///< World units; larger ellipses shrink to it and keep their shape; >= min_radius.
 };
 
 /// An ellipse about a point of a path, in the plane normal to the path. It has two pairs of spanning vectors, for two
