@@ -4,7 +4,7 @@
 /// trusts the lengths in damaged trees, which may end the process. vdb_tree_check.h checks the lengths first.
 /// Not detected: changed bytes within voxel values or active masks where all lengths still fit, because the format
 /// has no checksum. Files older than format 222 (OpenVDB 3) are refused: their lengths are not checked.
-/// Only .cpp files of this folder that use OpenVDB themselves include this header: it includes all of OpenVDB.
+/// It includes all of OpenVDB: only sources that use OpenVDB themselves include it, and two headers of ../files.
 
 #include <bitset>
 #include <cstdint>
