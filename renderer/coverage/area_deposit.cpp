@@ -76,8 +76,6 @@ void AreaDeposit::set_plane_weights(const PlaneWeights& plane_weights) {
   if (plane_weights == plane_weights_) return;
   flush();
   plane_weights_ = plane_weights;
-  max_weight_ = 0;
-  for (const double share : plane_weights) max_weight_ = std::max(max_weight_, std::abs(share));
 }
 
 double AreaDeposit::triangle(const Vector2d& a, const Vector2d& b, const Vector2d& c, double power) {
@@ -88,7 +86,7 @@ double AreaDeposit::triangle(const Vector2d& a, const Vector2d& b, const Vector2
     return 0;
   }
   const double twice_area = twice_area_of(a, b, c), density = -2 * unit * power / twice_area;
-  if (!is_line(high - low, twice_area) && std::abs(density) * max_weight_ <= max_sum) return density;
+  if (!is_line(high - low, twice_area) && std::abs(density) <= max_sum) return density;
   const std::vector<Vector2d> points = points_of_line(a, b, c);
   for (const Vector2d& point : points) add_point(point, power / static_cast<double>(points.size()));
   return 0;

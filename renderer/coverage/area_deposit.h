@@ -93,7 +93,6 @@ class AreaDeposit {
   int width_, height_, first_row_, end_row_;
   std::size_t stride_;  // Three more than the width: an edge on the right border adds there.
   PlaneWeights plane_weights_{1};
-  double max_weight_ = 1;
   EdgeBatch batch_;
   std::vector<std::uint64_t> sums_;  // The power of a pixel is the sum from the beginning of its row up to it.
 };

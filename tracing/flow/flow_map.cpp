@@ -61,9 +61,8 @@ double first_size(const TensorField& field, const Beam& beam, double pixel, cons
   return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
 }
 
-/// What the landings of a vertex depend on, beside the map's settings: where its light starts, and a hash of the
-/// landings of its parents.
-using VertexKey = std::array<std::uint64_t, 3>;
+/// What the landings of a vertex depend on, beside the map's settings: the bits of the place where its light starts.
+using VertexKey = std::array<std::uint64_t, 2>;
 
 std::uint64_t hash_of(const void* values, std::size_t size, std::uint64_t before) {
   return content_hash({static_cast<const char*>(values), size}, before);
@@ -97,7 +96,7 @@ class FlowVertices {
   }
 
   /// The index of the vertex at a point of the finest lattice, which is added if it is not there.
-  std::uint32_t at(std::uint32_t patch, std::uint32_t x, std::uint32_t y, const Parents& parents = {}) {
+  std::uint32_t at(std::uint32_t patch, std::uint32_t x, std::uint32_t y) {
     const auto [found, is_new] =
         lattice.vertices.emplace(FlowLattice::key(patch, x, y), static_cast<std::uint32_t>(map_.starts.size()));
     if (is_new) {
@@ -105,13 +104,12 @@ class FlowVertices {
       const double u = lattice.u_of(patch, x), v = lattice.v_of(patch, y);
       map_.starts.push_back(p.at(u, v));
       const double least = settings_.silhouette ? inset : 0;
-      starts_.push_back({p.at(std::clamp(u, least, 1 - least), std::clamp(v, least, 1 - least)), parents});
+      origins_.push_back(p.at(std::clamp(u, least, 1 - least), std::clamp(v, least, 1 - least)));
     }
     return found->second;
   }
 
-  /// Traces the light of those that were added; their parents must have been traced before. @throw Cancelled; as
-  /// Ranks::all_gather; DamagedArchive.
+  /// Traces the light of those that were added. @throw Cancelled; as Ranks::all_gather; DamagedArchive.
   void trace_new() {
     const std::size_t count = map_.starts.size(), first = traced_;
     map_.landings.resize(count * map_.wavelengths);
@@ -164,12 +162,6 @@ class FlowVertices {
   // enter the volume.
   static constexpr double inset = 3e-6;
 
-  /// Where light of a vertex starts.
-  struct Start {
-    Eigen::Vector2d origin;  // Of its rays, in the beam's frame.
-    Parents parents;
-  };
-
   struct KeyHash {
     std::size_t operator()(const VertexKey& key) const { return hash_of(&key, sizeof key, 0); }
   };
@@ -177,7 +169,7 @@ class FlowVertices {
   void trace_vertices(std::size_t begin, std::size_t end) {
     std::vector<NewVertex> vertices;
     for (std::size_t i = begin; i < end; ++i)
-      if (!restore(i)) vertices.push_back({i, beam_.start(starts_[i].origin), starts_[i].parents});
+      if (!restore(i)) vertices.push_back({i, beam_.start(origins_[i])});
     tracer_.trace(map_, vertices);
   }
 
@@ -196,27 +188,9 @@ class FlowVertices {
         throw DamagedArchive();
   }
 
-  std::uint64_t hash_of_landings(std::size_t vertex) const {
-    std::uint64_t hash = 0;
-    const auto add = [&](const auto& values, std::size_t of_each) {
-      hash = hash_of(&values[vertex * of_each], of_each * sizeof values[0], hash);
-    };
-    add(map_.landings, map_.wavelengths);
-    add(map_.ends, map_.wavelengths);
-    add(map_.lengths, map_.checks());
-    return hash;
-  }
-
   VertexKey key_of(std::size_t vertex) const {
-    const auto& [origin, parents] = starts_[vertex];
-    VertexKey key{};
-    std::memcpy(key.data(), origin.data(), 2 * sizeof key[0]);
-    // In their order: lengths are sums in this order. A vertex between the parts of two shards has the parents of
-    // either quad, and each shard keeps it in its own way.
-    for (std::size_t i = 0; i < parents.count; ++i) {
-      const std::uint64_t hash = hash_of_landings(parents.vertices[i]);
-      key[2] = hash_of(&hash, sizeof hash, key[2]);
-    }
+    VertexKey key;
+    std::memcpy(key.data(), origins_[vertex].data(), sizeof key);
     return key;
   }
 
@@ -256,7 +230,7 @@ class FlowVertices {
   const Progress& progress_;
   WavelengthTracer tracer_;
   FlowMap map_;
-  std::vector<Start> starts_;
+  std::vector<Eigen::Vector2d> origins_;                           // Of the vertices' rays, in the beam's frame.
   std::size_t traced_ = 0;                                         // Number of vertices that have landings.
   std::vector<Result> found_;                                      // What the job has kept of this map.
   std::unordered_map<VertexKey, std::string_view, KeyHash> kept_;  // Landings in it.
@@ -440,10 +414,8 @@ class FlowMapBuilder {
 
   Middles middles_of(const Quad& quad) {
     const std::uint32_t side = lattice().side_of(quad), half = side / 2, x = quad.x, y = quad.y, p = quad.patch;
-    const auto& [a, b, c, d] = quad.corners;
-    return {vertices_.at(p, x + half, y, {{a, b}, 2}), vertices_.at(p, x + side, y + half, {{b, c}, 2}),
-            vertices_.at(p, x + half, y + side, {{c, d}, 2}), vertices_.at(p, x, y + half, {{d, a}, 2}),
-            vertices_.at(p, x + half, y + half, {{a, b, c, d}, 4})};
+    return {vertices_.at(p, x + half, y), vertices_.at(p, x + side, y + half), vertices_.at(p, x + half, y + side),
+            vertices_.at(p, x, y + half), vertices_.at(p, x + half, y + half)};
   }
 
   /// The error is what the part's own deviation will be if deviations go on to fall by the same ratio: to a quarter

@@ -17,53 +17,41 @@ namespace tensorray {
 
 constexpr std::size_t range_samples = 33;  // Wavelength samples of a range.
 
-/// The vertices in whose middle a new one lies: the ends of a side, or the corners of a quad. All of them are traced.
-struct Parents {
-  std::array<std::uint32_t, 4> vertices{};
-  std::size_t count = 0;  ///< 0, 2 or 4.
-};
-
-/// The landings of a vertex at all samples, of which every `step`-th is traced; step: 16, 8, 4, 2 or 1.
+/// The landings of a vertex at all samples, of which as few are traced as their smoothness allows.
 ///
-/// A polynomial through the nearest known samples predicts the others: a parabola if three are known, else a cubic
-/// through four. If all light of the parents lands, the errors that the same polynomials would have made for the
-/// parents are known. Their mean is added, so that only what differs from vertex to vertex remains as an error. Each
-/// quarter of the range is predicted on its own, as soon as it can be. Thus all samples are needed only near a kink.
+/// A polynomial through the nearest traced samples predicts the others: a cubic through four, if there are as many. Of
+/// a gap between traced samples, the middle is traced. If its prediction was good, both halves are predicted; otherwise
+/// they are gaps, too. Thus all samples are needed only near a kink. A gap of which the light of one side alone lands
+/// is bisected.
 class WavelengthPrediction {
  public:
-  /// @param plate  Width and height of the plate, pixels.
-  WavelengthPrediction(FlowMap& map, std::size_t vertex, const Parents& parents, const Eigen::Array2f& plate);
+  /// @param plate      Width and height of the plate, pixels.
+  /// @param tolerance  Of the prediction of middles, pixels. Where landings are smooth, those of halves are far better.
+  WavelengthPrediction(FlowMap& map, std::size_t vertex, const Eigen::Array2f& plate, float tolerance);
 
-  /// Whether the errors of the polynomials differ so little from parent to parent that their mean is good to within
-  /// `tolerance`, pixels.
-  bool parents_agree(std::size_t step, float tolerance) const;
-
-  /// Sets the samples that are not traced, in each quarter where they can be predicted to within `tolerance`, pixels,
-  /// if their light may fall on the plate. The test is to predict traced samples of the quarter from every second one:
-  /// they must be within `tolerance`. Where landings are smooth, the error of untraced samples is then far less.
-  /// @return Whether all samples are known.
-  bool predict(std::size_t step, float tolerance);
-
-  /// Whether a sample is in a quarter that is not predicted yet.
-  bool is_open(std::size_t sample) const;
+  /// The samples to trace next; the first time, five. If there are none, all landings are set.
+  const std::vector<int>& wanted() const { return wanted_; }
+  void go_on();  ///< Call it when these are traced.
 
  private:
-  bool landed(std::size_t sample) const { return ends_[sample] == RayEnd::plate; }
-  bool is_on_plate(std::size_t sample) const;
-  bool matters(std::size_t sample, std::size_t step) const;
-  bool is_smooth(std::size_t quarter, std::size_t step, float tolerance) const;
-  bool parents_agree(std::size_t quarter, std::size_t step, float tolerance) const;
-  bool is_smooth_beside_parents(std::size_t quarter, std::size_t step, float tolerance) const;
-  Eigen::Vector2f between(std::size_t sample, std::size_t step) const;
-  void set(std::size_t quarter, std::size_t step, bool beside_parents);
+  struct Gap {
+    int from, to;
+    int middle() const { return (from + to) / 2; }
+  };
+
+  bool landed(int sample) const { return ends_[sample] == RayEnd::plate; }
+  bool is_on_plate(int sample) const;
+  Eigen::Vector2f predicted(int sample) const;
+  void divide(std::vector<Gap> gaps);
+  void predict_rest();
 
   Eigen::Vector2f* landings_;
   RayEnd* ends_;
-  std::array<const Eigen::Vector2f*, 4> parents_{};
-  std::size_t parent_count_ = 0;                     // 0 if some of their light does not land.
-  std::array<Eigen::Vector2f, range_samples> mean_;  // Of the parents' landings, if their light lands.
   Eigen::Array2f plate_;
-  std::array<bool, 4> is_predicted_{};  // By quarter.
+  float tolerance_;
+  std::array<bool, range_samples> is_traced_{};
+  std::vector<Gap> open_;  // Whose middles are traced next.
+  std::vector<int> wanted_;
 };
 
 /// The place, on the plane of `plate`, of a point where light lands. A body's point is projected from the beam's
@@ -74,7 +62,6 @@ Eigen::Vector3d place_on(const Plate& plate, const Geometry& geometry, const Bea
 struct NewVertex {
   std::size_t index;  ///< In the map.
   Eigen::Vector3d origin;
-  Parents parents;
 };
 
 /// Traces as few wavelength samples as the smoothness of the landings allows, and predicts the others. Any number of
@@ -88,10 +75,10 @@ class WavelengthTracer {
   std::size_t wavelengths() const { return flexibilities_.size(); }
 
   /// At every so many wavelength samples there are lengths.
-  std::size_t check_step() const { return is_range_ ? first_step : 1; }
+  std::size_t check_step() const { return is_range_ ? (range_samples - 1) / 4 : 1; }
 
   /// Sets landings, ends and lengths of the vertices, for which the map has room. Different vertices may be traced at
-  /// once; their parents must be traced already.
+  /// once.
   void trace(FlowMap& map, const std::vector<NewVertex>& vertices);
 
   std::uint64_t rays() const { return rays_; }
@@ -99,15 +86,11 @@ class WavelengthTracer {
   std::uint64_t tensor_samples() const { return tensor_samples_; }
 
  private:
-  static constexpr std::size_t first_step = 8;      // 5 samples come first, ...
-  static constexpr std::size_t coarsest_step = 16;  // ... or 3, where the parents agree in what is between them.
-
   struct SampleRay {
     std::size_t vertex, sample;  // The vertex is a number of a new one.
   };
-  /// A vertex of which every `step`-th sample is traced next.
   struct PartlyTraced {
-    std::size_t vertex, step;
+    std::size_t vertex;
     WavelengthPrediction prediction;
   };
 
@@ -117,7 +100,6 @@ class WavelengthTracer {
   };
 
   void trace_rays(FlowMap& map, const std::vector<NewVertex>& vertices, const std::vector<SampleRay>& rays);
-  void predict_lengths(FlowMap& map, std::size_t vertex, const Parents& parents) const;
   RayEnd end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const;
 
   const TensorField& field_;
