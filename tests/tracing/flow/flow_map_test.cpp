@@ -359,8 +359,8 @@ TEST(KeptMap, LandingsThatNoLightHasAreRefused) {
     map_with(settings, job);
   };
   const std::string right = *kept.begin()->second;
-  // The key of a vertex has 24 bytes.
-  constexpr std::size_t landing = 24, end = landing + 2 * sizeof(float);
+  // The key of a vertex has 16 bytes.
+  constexpr std::size_t landing = 16, end = landing + 2 * sizeof(float);
   for (const int wrong : {ray_end_count, 255}) {
     std::string bytes = right;
     bytes[end] = static_cast<char>(wrong);
