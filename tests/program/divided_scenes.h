@@ -35,11 +35,12 @@ inline std::string plate_under_paths(const std::string& density) {
 }
 
 /// A scene of light on a plate, of a lens or of stretch. @param integrator  The value of its key.
-inline std::string plate_scene(const std::string& integrator, int photons = 20000) {
+inline std::string plate_scene(const std::string& integrator, int photons = 20000,
+                               const std::string& resolution = "[32, 24]") {
   return fmt::format(R"({{
   "field": {{"file": "field.vdb", "eigenvalues": "absolute", "scale": 4}}, "integrator": {},
-  "light": {{"photons": {}, "wavelengths": {{"count": 6}}}}, "receiver": {{"resolution": [32, 24]}}}})",
-                     integrator, photons);
+  "light": {{"photons": {}, "wavelengths": {{"count": 6}}}}, "receiver": {{"resolution": {}}}}})",
+                     integrator, photons, resolution);
 }
 
 inline const std::string gaussian_photons =

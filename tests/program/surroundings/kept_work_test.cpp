@@ -127,7 +127,8 @@ TEST_P(DividedWork, OfShardsMergesToTheSameFiles) {
 INSTANTIATE_TEST_SUITE_P(Methods, DividedWork,
                          testing::Values(lit_scene, plate_under_paths("mesh"), plate_scene(gaussian_photons, 100000),
                                          plate_scene(R"({"type": "photon_distribution", "density": {"error": 0.5}})"),
-                                         plate_scene(lens), plate_scene(stretch), plate_scene(polariscope)));
+                                         plate_scene(lens), plate_scene(stretch),
+                                         plate_scene(polariscope, 20000, "[16, 160]")));  // Rows are kept 64 at a time.
 
 TEST_F(KeptWork, AShardThatIsKilledContinues) {
   make(lit_scene);

@@ -43,7 +43,7 @@ TEST(Mirror, GivesTheWholeFieldOnAllLevels) {
         // Levels of the half lie away from the plane: finer voxels have no plane in common with one between voxels.
         const auto refines = [&](const Vector3i& brick) { return brick[axis] == (side > 0 ? 0 : -1); };
         const auto refines_both = [&](const Vector3i& brick) { return brick[axis] == 0 || brick[axis] == -1; };
-        const int levels = shift == 0 ? 3 : 1;
+        const int levels = shift != 0 ? 1 : axis == 0 ? 3 : 2;
         TensorGrid stored = grid_of_levels(half, levels, refines, value, to_world);
         stored.metadata[mirror_key] = std::string(1, "xyz"[axis]);
         const TensorGrid all = grid_of_levels(whole, levels, refines_both, value, to_world);
