@@ -14,6 +14,7 @@
 #include "scenes/outputs/body_outline.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
+#include "tracing/flow_drawing/caustic.h"
 
 namespace tensorray {
 namespace {

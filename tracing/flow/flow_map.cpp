@@ -23,17 +23,15 @@ namespace {
 
 constexpr double margin = 1.0 / 8;  // Extension of the plate on each side, in sizes of the plate.
 
-// The first quads are of the lesser of these two sizes, for the usual tolerance.
-constexpr double first_pixels = 8;       // In pixels of straight light.
-constexpr double first_voxels = 1;       // In voxels of the finest level, so that no part of the field is missed; ...
-constexpr double max_for_voxels = 64;    // ... but voxels ask for no more quads than this along a side.
+// Sides of first quads, for the usual tolerance: so many pixels of straight light, or a voxel of the finest level.
+constexpr double first_pixels = 8;
+constexpr double max_for_voxels = 64;    // Voxels ask for no more quads than this along a side.
 constexpr double most_around = 64;       // First quads along the beam, of light beside its core: it is straight.
 constexpr double usual_tolerance = 0.5;  // Pixels.
 
 constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
                                 // its own way within a part of one.
 constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than this part of the tolerance is allowed.
-constexpr double swept_share = 0.99;   // The part of the vertices whose light moves slowly enough from band to band.
 constexpr int max_levels = 14;
 constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
 
@@ -55,23 +53,24 @@ double first_size(const TensorField& field, const Beam& beam, double pixel, cons
   const double voxel =
       std::ldexp(start_ratio(beam, field.world_box().center()) * field.to_world().linear().colwise().norm().minCoeff(),
                  1 - field.levels());
-  const double for_voxels = std::max(first_voxels * voxel, extent.maxCoeff() / max_for_voxels);
+  const double for_voxels = std::max(voxel, extent.maxCoeff() / max_for_voxels);
   const double usual = std::min(first_pixels * pixel, for_voxels);
   const double least = std::sqrt(16 * box_of(beam.aperture).sizes().prod() / static_cast<double>(settings.max_starts));
   return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
 }
 
-/// What the landings of a vertex depend on, beside the map's settings: the bits of the place where its light starts.
-using VertexKey = std::array<std::uint64_t, 2>;
+/// What the landings of a vertex depend on, beside the map's settings: where its light starts, in the beam's frame.
+using VertexKey = std::array<double, 2>;
 
-std::uint64_t hash_of(const void* values, std::size_t size, std::uint64_t before) {
-  return content_hash({static_cast<const char*>(values), size}, before);
+template <class Values>
+std::uint64_t hash_of(const Values& values, std::uint64_t before) {
+  return content_hash({reinterpret_cast<const char*>(values.data()), values.size() * sizeof values[0]}, before);
 }
 
-/// What the landings of a vertex at the start of a map depend on beside its place.
+/// What the landings of all vertices depend on, beside their places.
 std::uint64_t hash_of_map(const Beam& beam, const FlowSettings& settings) {
   std::uint64_t hash = 0;
-  const auto add = [&](const auto& values) { hash = hash_of(values.data(), values.size() * sizeof values[0], hash); };
+  const auto add = [&](const auto& values) { hash = hash_of(values, hash); };
   const Plate& plate = *settings.plate;
   add(std::array<double, 4>{settings.tolerance, static_cast<double>(settings.range), plate.size.x(), plate.size.y()});
   add(settings.flexibilities);
@@ -121,9 +120,7 @@ class FlowVertices {
     tasks.for_all = true;
     tasks.round = round_tasks;
     tasks.make = [&](std::size_t task) { trace_vertices(begin_of(task), begin_of(task + 1)); };
-    tasks.copy = [&](std::size_t task, Archive& archive) {
-      copy_landings(begin_of(task), begin_of(task + 1), archive);
-    };
+    tasks.copy = [&](std::size_t task, Archive& to) { copy_landings(begin_of(task), begin_of(task + 1), to); };
     tasks.first = first / task_size;
     tasks.total = settings_.max_starts / task_size + 1;
     make_units(tasks, settings_.job, "tracing rays", progress_);
@@ -163,7 +160,7 @@ class FlowVertices {
   static constexpr double inset = 3e-6;
 
   struct KeyHash {
-    std::size_t operator()(const VertexKey& key) const { return hash_of(&key, sizeof key, 0); }
+    std::size_t operator()(const VertexKey& key) const { return hash_of(key, 0); }
   };
 
   void trace_vertices(std::size_t begin, std::size_t end) {
@@ -188,11 +185,7 @@ class FlowVertices {
         throw DamagedArchive();
   }
 
-  VertexKey key_of(std::size_t vertex) const {
-    VertexKey key;
-    std::memcpy(key.data(), origins_[vertex].data(), sizeof key);
-    return key;
-  }
+  VertexKey key_of(std::size_t vertex) const { return {origins_[vertex].x(), origins_[vertex].y()}; }
 
   std::string name_of(std::size_t part) const {
     return fmt::format("flow map {:016x} {}", hash_of_map(beam_, settings_), part);
@@ -365,8 +358,7 @@ class FlowMapBuilder {
       is_seen = true;
     }
     const float sweep = settings_.range ? (last - first).norm() : 0;
-    if (!is_seen) return false;
-    return quad.error > error_bound(quad, extent, width, sweep);
+    return is_seen && quad.error > error_bound(quad, extent, width, sweep);
   }
 
   /// The quads that need division, or those with the greatest errors if they are too many.
@@ -487,26 +479,6 @@ class FlowMapBuilder {
 };
 
 }  // namespace
-
-int band_count(const FlowMap& map, int channels, const BandStep& step) {
-  if (map.wavelengths == 1) return channels;
-  std::vector<float> sweeps;
-  for (std::size_t i = 0; i < map.starts.size(); ++i) {
-    float sweep = 0;
-    for (std::size_t sample = 1; sample < map.wavelengths; ++sample) {
-      const std::size_t at = i * map.wavelengths + sample;
-      if (map.ends[at] == RayEnd::plate && map.ends[at - 1] == RayEnd::plate)
-        sweep += (map.landings[at] - map.landings[at - 1]).norm();
-    }
-    if (sweep > 0) sweeps.push_back(sweep);  // Straight light does not count.
-  }
-  if (sweeps.empty()) sweeps.push_back(0);
-  const auto place = static_cast<std::ptrdiff_t>(swept_share * static_cast<double>(sweeps.size() - 1));
-  std::nth_element(sweeps.begin(), sweeps.begin() + place, sweeps.end());
-  const double wanted = std::max<double>(step.least, sweeps[static_cast<std::size_t>(place)] / step.pixels);
-  const double most = std::max(1.0, std::floor(static_cast<double>(step.most) / channels));
-  return channels * static_cast<int>(std::clamp(std::ceil(wanted / channels), 1.0, most));
-}
 
 FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Beam& beam,
                        const BendingSettings& bending, const FlowSettings& settings, const Progress& progress) {

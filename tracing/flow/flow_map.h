@@ -101,16 +101,6 @@ struct FlowMap {
   std::size_t checks() const { return (wavelengths - 1) / check_step + 1; }  ///< Number of samples with lengths.
 };
 
-/// How finely a spectrum is divided into bands.
-struct BandStep {
-  double pixels = 1;  ///< Light moves by no more than this from band to band, for 99 of 100 vertices whose light moves.
-  int least = 1;      ///< Number of bands, at least; ...
-  int most = 128;     ///< ... and at most.
-};
-
-/// The number of bands: a multiple of `channels`, whatever the limits are; one a channel if all light bends alike.
-int band_count(const FlowMap& map, int channels, const BandStep& step = {});
-
 /// Where light of one vertex lands, at a place among the wavelength samples.
 struct FlowLanding {
   RayEnd end = RayEnd::missed;

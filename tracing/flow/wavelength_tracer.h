@@ -74,11 +74,10 @@ class WavelengthTracer {
 
   std::size_t wavelengths() const { return flexibilities_.size(); }
 
-  /// At every so many wavelength samples there are lengths.
+  /// At every so many wavelength samples there are lengths; in a range, those are traced first.
   std::size_t check_step() const { return is_range_ ? (range_samples - 1) / 4 : 1; }
 
-  /// Sets landings, ends and lengths of the vertices, for which the map has room. Different vertices may be traced at
-  /// once.
+  /// Sets landings, ends and lengths of the vertices, for which the map has room. Different ones may be traced at once.
   void trace(FlowMap& map, const std::vector<NewVertex>& vertices);
 
   std::uint64_t rays() const { return rays_; }

@@ -21,6 +21,7 @@ constexpr double even_part = 0.1;     // If the densities of a quad's halves dif
                                       // they become one; ...
 constexpr double uneven_part = 0.15;  // ... from this part on they stay as they are.
 constexpr std::size_t max_memory = 1u << 28;  // Bytes of the deposits of all threads; but each has a row, at least.
+constexpr double swept_share = 0.99;  // The part of the vertices whose light moves slowly enough from band to band.
 constexpr std::size_t planes = DepositPlanes::count;
 
 /// What is drawn together on the planes of a deposit: the colours, or the irradiance of some channels.
@@ -378,6 +379,26 @@ void draw_strip(const Drawing& drawing, const Pass& pass, const Strip& strip, Po
 }
 
 }  // namespace
+
+int band_count(const FlowMap& map, int channels, const BandStep& step) {
+  if (map.wavelengths == 1) return channels;
+  std::vector<float> sweeps;
+  for (std::size_t i = 0; i < map.starts.size(); ++i) {
+    float sweep = 0;
+    for (std::size_t sample = 1; sample < map.wavelengths; ++sample) {
+      const std::size_t at = i * map.wavelengths + sample;
+      if (map.ends[at] == RayEnd::plate && map.ends[at - 1] == RayEnd::plate)
+        sweep += (map.landings[at] - map.landings[at - 1]).norm();
+    }
+    if (sweep > 0) sweeps.push_back(sweep);  // Straight light does not count.
+  }
+  if (sweeps.empty()) sweeps.push_back(0);
+  const auto place = static_cast<std::ptrdiff_t>(swept_share * static_cast<double>(sweeps.size() - 1));
+  std::nth_element(sweeps.begin(), sweeps.begin() + place, sweeps.end());
+  const double wanted = std::max<double>(step.least, sweeps[static_cast<std::size_t>(place)] / step.pixels);
+  const double most = std::max(1.0, std::floor(static_cast<double>(step.most) / channels));
+  return channels * static_cast<int>(std::clamp(std::ceil(wanted / channels), 1.0, most));
+}
 
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
                      const CausticSettings& settings, const Progress& progress) {

@@ -24,6 +24,16 @@ struct CausticBand {
   Eigen::Vector3d color = Eigen::Vector3d::Zero();
 };
 
+/// How finely a spectrum is divided into bands.
+struct BandStep {
+  double pixels = 1;  ///< Light moves by no more than this from band to band, for 99 of 100 vertices whose light moves.
+  int least = 1;      ///< Number of bands, at least; ...
+  int most = 128;     ///< ... and at most.
+};
+
+/// The number of bands: a multiple of `channels`, whatever the limits are; one a channel if all light bends alike.
+int band_count(const FlowMap& map, int channels, const BandStep& step = {});
+
 struct Caustic {
   Film color;       ///< Red, green and blue: the sum of the bands' colours times their irradiance.
   Film irradiance;  ///< If asked for: a plane for each channel, where 1 is the undisturbed beam in that channel.

@@ -313,7 +313,7 @@ Results shard_of(const FlowSettings& settings, WorkPart part, std::size_t& rays)
 
 TEST(KeptMap, OfShardsIsThatOfOneRun) {
   std::vector<FlowSettings> all{single(0.3), range(0.1, 0.4)};
-  all.back().silhouette = false;  // Its vertices at the border are predicted, too.
+  all.back().silhouette = false;
   for (const FlowSettings& settings : all) {
     const FlowMap alone = map_of(bench(), settings);
     for (const std::size_t count : {1, 3, 16}) {
