@@ -15,6 +15,7 @@
 #include "base/geometry/box.h"
 #include "base/process/job.h"
 #include "base/text/content_hash.h"
+#include "tracing/flow/cutoff.h"
 #include "tracing/flow/flow_lattice.h"
 #include "tracing/flow/wavelength_tracer.h"
 
@@ -32,6 +33,8 @@ constexpr double usual_tolerance = 0.5;  // Pixels.
 constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
                                 // its own way within a part of one.
 constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than this part of the tolerance is allowed.
+constexpr int edge_levels_left = 2;  // Where the edge of a shadow leaves the range, quads stop so many divisions before
+                                     // the last one.
 constexpr int max_levels = 14;
 constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
 
@@ -336,6 +339,7 @@ class FlowMapBuilder {
     const float tolerance = static_cast<float>(settings_.tolerance), pixel = 1;
     if (!settings_.silhouette) return tolerance * std::sqrt(std::max(extent, pixel));
     const float size = std::ldexp(first_size_, -quad.level);
+    if (!std::isfinite(width)) width = size;  // Of all of its light, a part does not land.
     return tolerance * std::max(width / size, gathered_part) *
            std::cbrt(std::max(sweep / std::max(width, pixel), 1.0f));
   }
@@ -344,21 +348,32 @@ class FlowMapBuilder {
     if (quad.level >= lattice().levels) return false;
     const bool is_at_edge = settings_.silhouette && lattice().is_at_edge(quad);
     if (quad.level < (is_at_edge ? edge_levels : 1)) return true;  // There is no estimate of its error yet.
+    const ShadowEdge edge = edge_of(quad.corners);
     bool is_seen = false;
     float width = std::numeric_limits<float>::infinity(), extent = 0;
     Eigen::Vector2f first(0, 0), last(0, 0);
     for (std::size_t sample = 0; sample < map().wavelengths; sample += map().check_step) {
       const Reach reach = reach_of(quad.corners, sample);
       if (!is_on_plate(reach)) continue;
-      if (reach.landed < 4) return true;
-      width = std::min(width, width_of(quad, reach, sample));
+      if (reach.landed < 4 && !edge.is_within)
+        return !edge.is_known || quad.level < lattice().levels - edge_levels_left;
       extent = std::max(extent, (reach.high - reach.low).maxCoeff());
-      last = map().landing(quad.corners[0], sample);
-      if (!is_seen) first = last;
+      if (reach.landed == 4) {
+        width = std::min(width, width_of(quad, reach, sample));
+        last = map().landing(quad.corners[0], sample);
+        if (!is_seen) first = last;
+      }
       is_seen = true;
     }
     const float sweep = settings_.range ? (last - first).norm() : 0;
     return is_seen && quad.error > error_bound(quad, extent, width, sweep);
+  }
+
+  /// The edge of a shadow between vertices. Maps that are not drawn as light have no use for it.
+  template <std::size_t count>
+  ShadowEdge edge_of(const std::array<std::uint32_t, count>& vertices) const {
+    if (!settings_.silhouette || map().check_step == 1) return {};
+    return edge_between(cutoffs_of(map(), vertices).data(), count);
   }
 
   /// The quads that need division, or those with the greatest errors if they are too many.
@@ -426,12 +441,18 @@ class FlowMapBuilder {
   }
 
   /// How far the landings of the middles are, at most, from what the corners beside them predict, at one wavelength
-  /// sample; infinite if some of the light does not land.
-  float deviation_at(const Quad& quad, const Middles& middles, std::size_t sample) const {
+  /// sample; infinite if some of the light does not land, unless the edge of its shadow is within the quad.
+  float deviation_at(const Quad& quad, const Middles& middles, const ShadowEdge& edge, std::size_t sample) const {
+    constexpr float unknown = std::numeric_limits<float>::infinity();
     std::array<Eigen::Vector2f, 4> at;
-    for (int i = 0; i < 4; ++i) {
-      if (!map().landed(quad.corners[i], sample)) return std::numeric_limits<float>::infinity();
-      at[i] = map().landing(quad.corners[i], sample);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::uint32_t corner = quad.corners[i];
+      const bool lands = map().landed(corner, sample);
+      if (!lands && !edge.is_within) return unknown;
+      at[i] = lands ? map().landing(corner, sample)
+                    : landing_beyond(map(), corner, cutoff_of(map(), corner), static_cast<double>(sample),
+                                     quad.corners.data(), 4)
+                          .cast<float>();
     }
     const auto [u, v] = middle_of(quad);
     const auto between = [](const Eigen::Vector2f& from, const Eigen::Vector2f& to, float part) {
@@ -442,7 +463,10 @@ class FlowMapBuilder {
                                                   between(bottom, top, v)};
     float greatest = 0;
     for (int i = 0; i < 5; ++i) {
-      if (!map().landed(middles[i], sample)) return std::numeric_limits<float>::infinity();
+      if (!map().landed(middles[i], sample)) {
+        if (!edge.is_within) return unknown;
+        continue;
+      }
       greatest = std::max(greatest, (map().landing(middles[i], sample) - expected[i]).norm());
     }
     return greatest;
@@ -463,9 +487,10 @@ class FlowMapBuilder {
   float deviation_of(const Quad& quad, const Middles& middles) const {
     const auto& [a, b, c, d] = quad.corners;
     const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
+    const ShadowEdge edge = edge_of(all);
     float greatest = 0;
     for (std::size_t sample = 0; sample < map().wavelengths; sample += map().check_step)
-      if (is_on_plate(reach_of(all, sample))) greatest = std::max(greatest, deviation_at(quad, middles, sample));
+      if (is_on_plate(reach_of(all, sample))) greatest = std::max(greatest, deviation_at(quad, middles, edge, sample));
     return greatest;
   }
 

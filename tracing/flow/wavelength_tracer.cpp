@@ -10,7 +10,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double prediction_part = 4;  // Middles of gaps are predicted to within the tolerance divided by this.
+constexpr double prediction_part = 2;  // Middles of gaps are predicted to within the tolerance divided by this.
 constexpr double off_surface = 1e-4;   // Distance, in sizes of a body, at which it is looked for about its own points.
 
 constexpr int last_sample = range_samples - 1;

@@ -126,15 +126,76 @@ bool is_whole(const FlowPiece& piece, const FlowPiece::Triangle& triangle, const
   return landed(a) && landed(b) && landed(c) && !jumps(triangle.is_torn, at[a], at[b], at[c]);
 }
 
+/// Deposits a part of a triangle's light.
+void draw_part(const Drawing& drawing, const std::array<Eigen::Vector2d, 3>& at, double carried, Worker& worker,
+               Power& power) {
+  const double on_plate = part_on_plate(at[0], at[1], at[2], drawing.plate);
+  power[static_cast<int>(RayEnd::plate)] += on_plate * carried;
+  power[static_cast<int>(RayEnd::missed)] += (1 - on_plate) * carried;
+  const double density = worker.deposit.triangle(at[0], at[1], at[2], carried);
+  for (std::size_t i = 0; density != 0 && i < 3; ++i) worker.deposit.add_edge(at[i], at[(i + 1) % 3], density);
+}
+
+/// How far a vertex is on the lit side of the edge of a shadow, in samples. The cutoff of one that is always lit is
+/// beyond the range.
+double depth_of(const Cutoff& cutoff, const ShadowEdge& edge, double sample, std::size_t samples) {
+  const double at = cutoff.is_single() ? cutoff.at : edge.lands_before ? static_cast<double>(samples) - 0.5 : -0.5;
+  return edge.lands_before ? at - sample : sample - at;
+}
+
+/// Draws the lit part of a triangle within which the edge of a shadow is known: depths, and where light lands beyond
+/// its cutoff, are linear there. @return false if there is no such edge.
+bool draw_lit_part(const Drawing& drawing, const FlowPiece& piece, const FlowPiece::Triangle& triangle, double sample,
+                   double carried, Worker& worker, Power& power) {
+  if (piece.always_lands) return false;
+  const auto is_lit = [&](std::size_t i) { return worker.ends[triangle.corners[i]] == RayEnd::plate; };
+  const int lit = is_lit(0) + is_lit(1) + is_lit(2);
+  if (lit == 0 || lit == 3) return false;
+  std::array<Cutoff, 3> cutoffs;
+  std::array<std::uint32_t, 3> vertices{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    cutoffs[i] = piece.cutoffs[triangle.corners[i]];
+    vertices[i] = piece.vertices[triangle.corners[i]];
+    if (cutoffs[i].kind == Cutoff::Kind::never) return false;
+  }
+  const ShadowEdge edge = edge_between(cutoffs.data(), 3);
+  if (!edge.is_known) return false;
+  std::array<double, 3> depth{};
+  std::array<Eigen::Vector2d, 3> at;
+  for (std::size_t i = 0; i < 3; ++i) {
+    depth[i] = depth_of(cutoffs[i], edge, sample, drawing.map.wavelengths);
+    at[i] = is_lit(i) ? worker.at[triangle.corners[i]]
+                      : landing_beyond(drawing.map, vertices[i], cutoffs[i], sample, vertices.data(), 3);
+  }
+  std::size_t alone = 0;  // The corner that has no other one on its side of the edge.
+  while (is_lit(alone) != (lit == 1)) ++alone;
+  const std::size_t next = (alone + 1) % 3, last = (alone + 2) % 3;
+  const auto part_to = [&](std::size_t other) { return depth[alone] / (depth[alone] - depth[other]); };
+  const double to_next = part_to(next), to_last = part_to(last), tip = to_next * to_last;
+  const Eigen::Vector2d on_next = at[alone] + to_next * (at[next] - at[alone]),
+                        on_last = at[alone] + to_last * (at[last] - at[alone]);
+  if (lit == 1) {
+    draw_part(drawing, {at[alone], on_next, on_last}, tip * carried, worker, power);
+  } else {
+    draw_part(drawing, {on_next, at[next], at[last]}, (1 - to_next) * carried, worker, power);
+    draw_part(drawing, {on_next, at[last], on_last}, to_next * (1 - to_last) * carried, worker, power);
+  }
+  const RayEnd end = worker.ends[triangle.corners[lit == 1 ? next : alone]];
+  power[static_cast<int>(end)] += (lit == 1 ? 1 - tip : tip) * carried;
+  return true;
+}
+
 /// Finds the light of broken triangles: each corner has a third, which whole triangles beside it get. In a pixel of its
 /// own it would be a bright dot wherever the light around it is spread far. Only without such triangles it is added
 /// here, as a point.
-void share_corners(const Drawing& drawing, const FlowPiece& piece, double unit, Worker& worker, Power& power) {
+void share_corners(const Drawing& drawing, const FlowPiece& piece, double sample, double unit, Worker& worker,
+                   Power& power) {
   worker.corners.clear();
   if (piece.always_lands && !piece.has_torn) return;
   worker.corners.resize(piece.vertices.size());
   for (const FlowPiece::Triangle& triangle : piece.triangles) {
     const bool whole = is_whole(piece, triangle, worker);
+    if (!whole && draw_lit_part(drawing, piece, triangle, sample, unit * triangle.area, worker, power)) continue;
     const double third = unit * triangle.area / 3;
     for (const std::uint16_t corner : triangle.corners) {
       const RayEnd end = piece.always_lands ? RayEnd::plate : worker.ends[corner];
@@ -198,7 +259,7 @@ void draw_piece(const Drawing& drawing, const FlowPiece& piece, double sample, d
   worker.is_all_on_plate = piece.always_lands && plate.contains(worker.box);
   std::vector<double>& densities = worker.densities;
   densities.clear();
-  share_corners(drawing, piece, unit, worker, power);
+  share_corners(drawing, piece, sample, unit, worker, power);
   for (const FlowPiece::Triangle& triangle : piece.triangles)
     densities.push_back(start_triangle(drawing, piece, triangle, unit * triangle.area, worker, power));
   for (const FlowPiece::Edge& edge : piece.edges)

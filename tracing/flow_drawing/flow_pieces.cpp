@@ -145,6 +145,8 @@ class PieceBuilder {
         piece.landings[sample * piece.vertices.size() + i] = map_.landings[at];
         piece.always_lands = piece.always_lands && map_.ends[at] == RayEnd::plate;
       }
+    if (!piece.always_lands)
+      for (const std::uint32_t vertex : piece.vertices) piece.cutoffs.push_back(cutoff_of(map_, vertex));
   }
 
   const FlowPieces& pieces_;

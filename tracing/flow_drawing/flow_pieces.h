@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "tracing/flow/cutoff.h"
 #include "tracing/flow/flow_map.h"
 
 namespace tensorray {
@@ -35,6 +36,7 @@ struct FlowPiece {
   std::vector<Edge> edges;  ///< The sides of the triangles, once.
   bool always_lands = true;
   bool has_torn = false;
+  std::vector<Cutoff> cutoffs;            ///< Of the vertices; empty if all of them always land.
   std::vector<Eigen::Vector2f> landings;  ///< At [sample · vertices.size() + i].
 };
 
