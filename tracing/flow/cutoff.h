@@ -29,8 +29,8 @@ std::array<Cutoff, count> cutoffs_of(const FlowMap& map, const std::array<std::u
 
 /// The edge of a shadow between some vertices.
 struct ShadowEdge {
-  bool is_known = false;  ///< Whether some vertices have single cutoffs, all of one kind, and the others are lit or
-                          ///< dark at all samples.
+  bool is_known = false;   ///< Whether some vertices have single cutoffs, all of one kind, and the others are lit or
+                           ///< dark at all samples.
   bool is_within = false;  ///< Whether all vertices have such cutoffs.
   bool lands_before = false;
 };

@@ -191,7 +191,7 @@ class TriangleBuilder {
     const auto& [a, b, c, d] = quad.corners;
     const std::uint32_t first = add_triangle(a, b, c, quad.error, torn);
     const std::uint32_t second = add_triangle(a, c, d, quad.error, torn);
-    add_edge({c, a, first, second, true});
+    add_edge({c, a, first, second});
     for (std::size_t i = 0; i < 4; ++i)
       add_outline_edge(quad.corners[i], quad.corners[(i + 1) % 4], i < 2 ? first : second);
   }

@@ -71,7 +71,6 @@ struct FlowEdge {
   static constexpr std::uint32_t none = 0xffffffffu;
   std::uint32_t from = 0, to = 0;              ///< Indices of vertices.
   std::uint32_t along = none, against = none;  ///< The triangle that has it in this sense, and in the other one.
-  bool is_diagonal = false;                    ///< Whether its triangles are the halves of a quad.
 };
 
 /// A mesh of triangles whose vertices say where light starts, and where it lands at each wavelength sample. A sample is

@@ -17,9 +17,6 @@
 namespace tensorray {
 namespace {
 
-constexpr double even_part = 0.1;     // If the densities of a quad's halves differ by less than this part of their sum,
-                                      // they become one; ...
-constexpr double uneven_part = 0.15;  // ... from this part on they stay as they are.
 constexpr std::size_t max_memory = 1u << 28;  // Bytes of the deposits of all threads; but each has a row, at least.
 constexpr double swept_share = 0.99;  // The part of the vertices whose light moves slowly enough from band to band.
 constexpr std::size_t planes = DepositPlanes::count;
@@ -126,14 +123,13 @@ bool is_whole(const FlowPiece& piece, const FlowPiece::Triangle& triangle, const
   return landed(a) && landed(b) && landed(c) && !jumps(triangle.is_torn, at[a], at[b], at[c]);
 }
 
-/// Deposits a part of a triangle's light.
-void draw_part(const Drawing& drawing, const std::array<Eigen::Vector2d, 3>& at, double carried, Worker& worker,
-               Power& power) {
-  const double on_plate = part_on_plate(at[0], at[1], at[2], drawing.plate);
+/// Counts the power of a triangle. @return its density for its edges.
+double start_light(const Drawing& drawing, const std::array<Eigen::Vector2d, 3>& at, double carried, Worker& worker,
+                   Power& power) {
+  const double on_plate = worker.is_all_on_plate ? 1 : part_on_plate(at[0], at[1], at[2], drawing.plate);
   power[static_cast<int>(RayEnd::plate)] += on_plate * carried;
   power[static_cast<int>(RayEnd::missed)] += (1 - on_plate) * carried;
-  const double density = worker.deposit.triangle(at[0], at[1], at[2], carried);
-  for (std::size_t i = 0; density != 0 && i < 3; ++i) worker.deposit.add_edge(at[i], at[(i + 1) % 3], density);
+  return worker.deposit.triangle(at[0], at[1], at[2], carried);
 }
 
 /// How far a vertex is on the lit side of the edge of a shadow, in samples. The cutoff of one that is always lit is
@@ -174,11 +170,16 @@ bool draw_lit_part(const Drawing& drawing, const FlowPiece& piece, const FlowPie
   const double to_next = part_to(next), to_last = part_to(last), tip = to_next * to_last;
   const Eigen::Vector2d on_next = at[alone] + to_next * (at[next] - at[alone]),
                         on_last = at[alone] + to_last * (at[last] - at[alone]);
+  const auto draw = [&](const std::array<Eigen::Vector2d, 3>& corners, double part) {
+    const double density = start_light(drawing, corners, part * carried, worker, power);
+    for (std::size_t i = 0; density != 0 && i < 3; ++i)
+      worker.deposit.add_edge(corners[i], corners[(i + 1) % 3], density);
+  };
   if (lit == 1) {
-    draw_part(drawing, {at[alone], on_next, on_last}, tip * carried, worker, power);
+    draw({at[alone], on_next, on_last}, tip);
   } else {
-    draw_part(drawing, {on_next, at[next], at[last]}, (1 - to_next) * carried, worker, power);
-    draw_part(drawing, {on_next, at[last], on_last}, to_next * (1 - to_last) * carried, worker, power);
+    draw({on_next, at[next], at[last]}, 1 - to_next);
+    draw({on_next, at[last], on_last}, to_next * (1 - to_last));
   }
   const RayEnd end = worker.ends[triangle.corners[lit == 1 ? next : alone]];
   power[static_cast<int>(end)] += (lit == 1 ? 1 - tip : tip) * carried;
@@ -227,23 +228,7 @@ double start_triangle(const Drawing& drawing, const FlowPiece& piece, const Flow
       carried += worker.corners[corner].power / worker.corners[corner].triangles;
   }
   const auto [a, b, c] = triangle.corners;
-  const std::vector<Eigen::Vector2d>& at = worker.at;
-  const double on_plate = worker.is_all_on_plate ? 1 : part_on_plate(at[a], at[b], at[c], drawing.plate);
-  power[static_cast<int>(RayEnd::plate)] += on_plate * carried;
-  power[static_cast<int>(RayEnd::missed)] += (1 - on_plate) * carried;
-  return worker.deposit.triangle(at[a], at[b], at[c], carried);
-}
-
-/// Gives the two triangles of a quad one density if theirs are nearly the same, so that the edge between them need not
-/// be drawn. From `even_part` on, their difference grows to its full value without a jump. Their power stays the same.
-void even_out(double& a, double& b, double area_a, double area_b) {
-  if (!(a * b > 0)) return;
-  const double part = std::abs(a - b) / std::abs(a + b);
-  if (part >= uneven_part) return;
-  const double even = (area_a + area_b) / (area_a / a + area_b / b);
-  const double left = std::max(part - even_part, 0.0) / (uneven_part - even_part);
-  a = even + left * (a - even);
-  b = even + left * (b - even);
+  return start_light(drawing, {worker.at[a], worker.at[b], worker.at[c]}, carried, worker, power);
 }
 
 /// Draws a piece at one place among the wavelength samples.
@@ -262,10 +247,6 @@ void draw_piece(const Drawing& drawing, const FlowPiece& piece, double sample, d
   share_corners(drawing, piece, sample, unit, worker, power);
   for (const FlowPiece::Triangle& triangle : piece.triangles)
     densities.push_back(start_triangle(drawing, piece, triangle, unit * triangle.area, worker, power));
-  for (const FlowPiece::Edge& edge : piece.edges)
-    if (edge.is_diagonal)
-      even_out(densities[edge.along], densities[edge.against], piece.triangles[edge.along].area,
-               piece.triangles[edge.against].area);
   const auto density = [&](std::uint16_t triangle) {
     return triangle == FlowPiece::Edge::none ? 0 : densities[triangle];
   };

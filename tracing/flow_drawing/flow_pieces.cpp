@@ -133,7 +133,6 @@ class PieceBuilder {
     FlowPiece::Edge added{vertex(piece, edge.from), vertex(piece, edge.to)};
     if (has_along) added.along = places_[edge.along - first_];
     if (has_against) added.against = places_[edge.against - first_];
-    added.is_diagonal = edge.is_diagonal && has_along && has_against;
     result_[piece].edges.push_back(added);
   }
 

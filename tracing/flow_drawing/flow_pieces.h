@@ -26,7 +26,6 @@ struct FlowPiece {
   struct Edge {
     static constexpr std::uint16_t none = 0xffff;
     std::uint16_t from = 0, to = 0, along = none, against = none;  // See FlowEdge.
-    bool is_diagonal = false;
   };
 
   Detail detail = 0;
