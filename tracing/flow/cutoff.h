@@ -3,6 +3,7 @@
 /// this place is linear: so the edge of a shadow is known within quads that are far larger than a pixel.
 
 #include <array>
+#include <optional>
 
 #include <Eigen/Core>
 
@@ -41,5 +42,16 @@ ShadowEdge edge_between(const Cutoff* cutoffs, std::size_t count);
 /// of those `others` that lands at both.
 Eigen::Vector2d landing_beyond(const FlowMap& map, std::size_t vertex, const Cutoff& cutoff, double sample,
                                const std::uint32_t* others, std::size_t count);
+
+/// A part of a triangle's light, between its landings.
+struct LitTriangle {
+  std::array<Eigen::Vector2d, 3> at{};
+  double part = 0;
+};
+
+/// The lit part of a triangle at a place among the samples at which light of one or two corners lands: on one side of a
+/// straight edge, as one triangle or two. None if the edge is not known, or beyond the range.
+std::optional<std::array<LitTriangle, 2>> lit_part(const FlowMap& map, const std::array<std::uint32_t, 3>& vertices,
+                                                   const std::array<Cutoff, 3>& cutoffs, double sample);
 
 }  // namespace tensorray

@@ -91,34 +91,23 @@ std::vector<BandRun> runs_at(Detail detail, const std::vector<CausticBand>& band
 }
 
 void set_landings(const Drawing& drawing, const FlowPiece& piece, double sample, Worker& worker) {
-  const std::size_t count = piece.vertices.size();
-  worker.at.resize(count);
+  worker.at.clear();
+  worker.ends.clear();
   worker.box.setEmpty();
-  if (!piece.always_lands) {
-    worker.ends.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const FlowLanding landing = landing_at(drawing.map, piece.vertices[i], sample);
-      worker.at[i] = landing.at;
-      worker.ends[i] = landing.end;
-    }
-    return;
-  }
-  const auto before = std::min(static_cast<std::size_t>(sample), drawing.map.wavelengths - 1);
-  const Eigen::Vector2f *const a = &piece.landings[before * count],
-                               *const b = &piece.landings[std::min(before + 1, drawing.map.wavelengths - 1) * count];
-  const double part = sample - static_cast<double>(before);
-  for (std::size_t i = 0; i < count; ++i) {
-    worker.at[i] = (1 - part) * a[i].cast<double>() + part * b[i].cast<double>();
-    worker.box.extend(worker.at[i]);
+  for (const std::uint32_t vertex : piece.vertices) {
+    const FlowLanding landing = landing_at(drawing.map, vertex, sample);
+    worker.at.push_back(landing.at);
+    worker.ends.push_back(landing.end);
+    worker.box.extend(landing.at);
   }
 }
 
 /// Power by the end of its light.
 using Power = std::array<double, ray_end_count>;
 
-bool is_whole(const FlowPiece& piece, const FlowPiece::Triangle& triangle, const Worker& worker) {
+bool is_whole(const FlowPiece::Triangle& triangle, const Worker& worker) {
   const auto [a, b, c] = triangle.corners;
-  const auto landed = [&](std::uint16_t corner) { return piece.always_lands || worker.ends[corner] == RayEnd::plate; };
+  const auto landed = [&](std::uint16_t corner) { return worker.ends[corner] == RayEnd::plate; };
   const std::vector<Eigen::Vector2d>& at = worker.at;
   return landed(a) && landed(b) && landed(c) && !jumps(triangle.is_torn, at[a], at[b], at[c]);
 }
@@ -132,57 +121,25 @@ double start_light(const Drawing& drawing, const std::array<Eigen::Vector2d, 3>&
   return worker.deposit.triangle(at[0], at[1], at[2], carried);
 }
 
-/// How far a vertex is on the lit side of the edge of a shadow, in samples. The cutoff of one that is always lit is
-/// beyond the range.
-double depth_of(const Cutoff& cutoff, const ShadowEdge& edge, double sample, std::size_t samples) {
-  const double at = cutoff.is_single() ? cutoff.at : edge.lands_before ? static_cast<double>(samples) - 0.5 : -0.5;
-  return edge.lands_before ? at - sample : sample - at;
-}
-
-/// Draws the lit part of a triangle within which the edge of a shadow is known: depths, and where light lands beyond
-/// its cutoff, are linear there. @return false if there is no such edge.
+/// Draws the part of a broken triangle that is beside the edge of a shadow. @return false if that is not known.
 bool draw_lit_part(const Drawing& drawing, const FlowPiece& piece, const FlowPiece::Triangle& triangle, double sample,
                    double carried, Worker& worker, Power& power) {
-  if (piece.always_lands) return false;
-  const auto is_lit = [&](std::size_t i) { return worker.ends[triangle.corners[i]] == RayEnd::plate; };
-  const int lit = is_lit(0) + is_lit(1) + is_lit(2);
-  if (lit == 0 || lit == 3) return false;
-  std::array<Cutoff, 3> cutoffs;
   std::array<std::uint32_t, 3> vertices{};
+  std::array<Cutoff, 3> cutoffs;
+  RayEnd dark = RayEnd::plate;
   for (std::size_t i = 0; i < 3; ++i) {
-    cutoffs[i] = piece.cutoffs[triangle.corners[i]];
-    vertices[i] = piece.vertices[triangle.corners[i]];
-    if (cutoffs[i].kind == Cutoff::Kind::never) return false;
+    const std::uint16_t corner = triangle.corners[i];
+    vertices[i] = piece.vertices[corner];
+    cutoffs[i] = piece.cutoffs[corner];
+    if (worker.ends[corner] != RayEnd::plate) dark = worker.ends[corner];
   }
-  const ShadowEdge edge = edge_between(cutoffs.data(), 3);
-  if (!edge.is_known) return false;
-  std::array<double, 3> depth{};
-  std::array<Eigen::Vector2d, 3> at;
-  for (std::size_t i = 0; i < 3; ++i) {
-    depth[i] = depth_of(cutoffs[i], edge, sample, drawing.map.wavelengths);
-    at[i] = is_lit(i) ? worker.at[triangle.corners[i]]
-                      : landing_beyond(drawing.map, vertices[i], cutoffs[i], sample, vertices.data(), 3);
+  const auto lit = lit_part(drawing.map, vertices, cutoffs, sample);
+  if (!lit) return false;
+  for (const auto& [at, part] : *lit) {
+    const double density = start_light(drawing, at, part * carried, worker, power);
+    for (std::size_t i = 0; density != 0 && i < 3; ++i) worker.deposit.add_edge(at[i], at[(i + 1) % 3], density);
   }
-  std::size_t alone = 0;  // The corner that has no other one on its side of the edge.
-  while (is_lit(alone) != (lit == 1)) ++alone;
-  const std::size_t next = (alone + 1) % 3, last = (alone + 2) % 3;
-  const auto part_to = [&](std::size_t other) { return depth[alone] / (depth[alone] - depth[other]); };
-  const double to_next = part_to(next), to_last = part_to(last), tip = to_next * to_last;
-  const Eigen::Vector2d on_next = at[alone] + to_next * (at[next] - at[alone]),
-                        on_last = at[alone] + to_last * (at[last] - at[alone]);
-  const auto draw = [&](const std::array<Eigen::Vector2d, 3>& corners, double part) {
-    const double density = start_light(drawing, corners, part * carried, worker, power);
-    for (std::size_t i = 0; density != 0 && i < 3; ++i)
-      worker.deposit.add_edge(corners[i], corners[(i + 1) % 3], density);
-  };
-  if (lit == 1) {
-    draw({at[alone], on_next, on_last}, tip);
-  } else {
-    draw({on_next, at[next], at[last]}, 1 - to_next);
-    draw({on_next, at[last], on_last}, to_next * (1 - to_last));
-  }
-  const RayEnd end = worker.ends[triangle.corners[lit == 1 ? next : alone]];
-  power[static_cast<int>(end)] += (lit == 1 ? 1 - tip : tip) * carried;
+  power[static_cast<int>(dark)] += std::max(1 - (*lit)[0].part - (*lit)[1].part, 0.0) * carried;
   return true;
 }
 
@@ -195,11 +152,11 @@ void share_corners(const Drawing& drawing, const FlowPiece& piece, double sample
   if (piece.always_lands && !piece.has_torn) return;
   worker.corners.resize(piece.vertices.size());
   for (const FlowPiece::Triangle& triangle : piece.triangles) {
-    const bool whole = is_whole(piece, triangle, worker);
+    const bool whole = is_whole(triangle, worker);
     if (!whole && draw_lit_part(drawing, piece, triangle, sample, unit * triangle.area, worker, power)) continue;
     const double third = unit * triangle.area / 3;
     for (const std::uint16_t corner : triangle.corners) {
-      const RayEnd end = piece.always_lands ? RayEnd::plate : worker.ends[corner];
+      const RayEnd end = worker.ends[corner];
       if (whole)
         ++worker.corners[corner].triangles;
       else if (end != RayEnd::plate)
@@ -223,7 +180,7 @@ void share_corners(const Drawing& drawing, const FlowPiece& piece, double sample
 double start_triangle(const Drawing& drawing, const FlowPiece& piece, const FlowPiece::Triangle& triangle,
                       double carried, Worker& worker, Power& power) {
   if (!worker.corners.empty()) {
-    if (!is_whole(piece, triangle, worker)) return 0;
+    if (!is_whole(triangle, worker)) return 0;
     for (const std::uint16_t corner : triangle.corners)
       carried += worker.corners[corner].power / worker.corners[corner].triangles;
   }

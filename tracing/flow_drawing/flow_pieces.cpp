@@ -85,7 +85,7 @@ class PieceBuilder {
     for (std::size_t t = first_; t < last_; ++t) add_triangle(t);
     for (std::size_t t = first_; t < last_; ++t)
       for (const std::uint32_t edge : pieces_.edges[t]) add_edge(t, map_.edges[edge]);
-    for (FlowPiece& piece : result_) add_landings(piece);
+    for (FlowPiece& piece : result_) add_cutoffs(piece);
     return std::move(result_);
   }
 
@@ -136,16 +136,11 @@ class PieceBuilder {
     result_[piece].edges.push_back(added);
   }
 
-  void add_landings(FlowPiece& piece) const {
-    piece.landings.resize(map_.wavelengths * piece.vertices.size());
-    for (std::size_t i = 0; i < piece.vertices.size(); ++i)
-      for (std::size_t sample = 0; sample < map_.wavelengths; ++sample) {
-        const std::size_t at = piece.vertices[i] * map_.wavelengths + sample;
-        piece.landings[sample * piece.vertices.size() + i] = map_.landings[at];
-        piece.always_lands = piece.always_lands && map_.ends[at] == RayEnd::plate;
-      }
-    if (!piece.always_lands)
-      for (const std::uint32_t vertex : piece.vertices) piece.cutoffs.push_back(cutoff_of(map_, vertex));
+  void add_cutoffs(FlowPiece& piece) const {
+    for (const std::uint32_t vertex : piece.vertices) {
+      piece.cutoffs.push_back(cutoff_of(map_, vertex));
+      piece.always_lands = piece.always_lands && piece.cutoffs.back().kind == Cutoff::Kind::always;
+    }
   }
 
   const FlowPieces& pieces_;

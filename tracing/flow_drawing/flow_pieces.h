@@ -35,8 +35,7 @@ struct FlowPiece {
   std::vector<Edge> edges;  ///< The sides of the triangles, once.
   bool always_lands = true;
   bool has_torn = false;
-  std::vector<Cutoff> cutoffs;            ///< Of the vertices; empty if all of them always land.
-  std::vector<Eigen::Vector2f> landings;  ///< At [sample · vertices.size() + i].
+  std::vector<Cutoff> cutoffs;  ///< Of the vertices.
 };
 
 /// The map's triangles in groups of neighbours, and how often each is drawn.
