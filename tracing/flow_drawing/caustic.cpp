@@ -177,8 +177,8 @@ void share_corners(const Drawing& drawing, const FlowPiece& piece, double sample
 
 /// The density of a triangle for its edges; 0 if it is broken.
 /// @param carried  Its own power.
-double start_triangle(const Drawing& drawing, const FlowPiece& piece, const FlowPiece::Triangle& triangle,
-                      double carried, Worker& worker, Power& power) {
+double start_triangle(const Drawing& drawing, const FlowPiece::Triangle& triangle, double carried, Worker& worker,
+                      Power& power) {
   if (!worker.corners.empty()) {
     if (!is_whole(triangle, worker)) return 0;
     for (const std::uint16_t corner : triangle.corners)
@@ -203,7 +203,7 @@ void draw_piece(const Drawing& drawing, const FlowPiece& piece, double sample, d
   densities.clear();
   share_corners(drawing, piece, sample, unit, worker, power);
   for (const FlowPiece::Triangle& triangle : piece.triangles)
-    densities.push_back(start_triangle(drawing, piece, triangle, unit * triangle.area, worker, power));
+    densities.push_back(start_triangle(drawing, triangle, unit * triangle.area, worker, power));
   const auto density = [&](std::uint16_t triangle) {
     return triangle == FlowPiece::Edge::none ? 0 : densities[triangle];
   };
