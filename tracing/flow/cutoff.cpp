@@ -7,8 +7,9 @@ using Kind = Cutoff::Kind;
 Cutoff cutoff_of(const FlowMap& map, std::size_t vertex) {
   const bool lands = map.landed(vertex, 0);
   Cutoff cutoff{lands ? Kind::always : Kind::never};
-  for (std::size_t sample = 1; sample < map.wavelengths; ++sample) {
-    if (map.landed(vertex, sample) == map.landed(vertex, sample - 1)) continue;
+  for (std::size_t sample = 0; sample < map.wavelengths; ++sample) {
+    if (map.ends[vertex * map.wavelengths + sample] == RayEnd::side) return {};
+    if (sample == 0 || map.landed(vertex, sample) == map.landed(vertex, sample - 1)) continue;
     if (cutoff.is_single()) return {};
     cutoff = {lands ? Kind::before : Kind::after, static_cast<double>(sample) - 0.5};
   }

@@ -13,7 +13,8 @@ namespace tensorray {
 
 struct Cutoff {
   enum class Kind { never, always, before, after, other };
-  Kind kind = Kind::other;  ///< Light lands at no sample, at all, at those before or after `at`; or here and there.
+  Kind kind = Kind::other;  ///< Light lands at no sample, at all, at those before or after `at`; or here and there. Of
+                            ///< light that leaves by a side face: `other`, as beside it landings bend like a root.
   double at = 0;            ///< Halfway between two samples.
 
   bool is_single() const { return kind == Kind::before || kind == Kind::after; }
