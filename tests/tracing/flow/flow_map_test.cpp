@@ -210,6 +210,34 @@ TEST(FlowMap, SideLightOfARangeIsLeftOutAtEachWavelength) {
   }
 }
 
+/// The edge of a shadow is elsewhere at each wavelength. Between vertices it is within a tenth of a pixel.
+TEST(FlowMap, ShadowsOfARangeNeedNoFineQuads) {
+  Surfaces surfaces;
+  surfaces.obstacles.push_back(box_mesh(Eigen::AlignedBox3d(Vector3d(-0.5, -0.4, -1.6), Vector3d(0.3, 0.45, -1.5)),
+                                        Eigen::Affine3d::Identity()));
+  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 256), surfaces);
+  const auto traced = [&](double finest) {
+    FlowSettings settings = range(0.02, 0.1);
+    settings.finest = finest;
+    return map_of(bench, settings);
+  };
+  const FlowMap map = traced(0.5), fine = traced(0.0625);
+  EXPECT_LT(3 * map.starts.size(), fine.starts.size());
+  const double tenth = 0.1 * 2 * (0.8 + 0.85) * 3 / 256 / area(bench.beam.aperture);  // Of a pixel, along the edge.
+  double squares = 0, all = 0;
+  for (const double sample : {3.0, 11.6, 20.0, 28.3}) {
+    CausticBand band;
+    band.sample = sample;
+    const Caustic light = caustic_of(bench, map, {band}), exact = caustic_of(bench, fine, {band});
+    EXPECT_NEAR(power_of(light, RayEnd::obstacle), power_of(exact, RayEnd::obstacle), tenth) << sample;
+    for (std::size_t i = 0; i < light.irradiance.values.size(); ++i) {
+      squares += std::pow(light.irradiance.values[i] - exact.irradiance.values[i], 2);
+      all += std::pow(exact.irradiance.values[i], 2);
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / all), 0.01);
+}
+
 /// Where large quads are smooth, their light is even within a triangle, which is of first order in their size: the
 /// error falls by more than half with a quarter of the tolerance, and by more where quads are near a pixel.
 TEST(FlowMap, ConvergesWithItsTolerance) {
