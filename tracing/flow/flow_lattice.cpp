@@ -5,8 +5,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "tracing/flow/cutoff.h"
-
 namespace tensorray {
 namespace {
 
@@ -132,23 +130,12 @@ class TriangleBuilder {
     Eigen::Vector2d start(0, 0);
     for (const std::uint32_t corner : quad.corners) start += map_.starts[corner] / 4;
     map_.starts.push_back(start);
-    const std::array<Cutoff, 4> cutoffs = cutoffs_of(map_, quad.corners);
-    const ShadowEdge edge = edge_between(cutoffs.data(), 4);
-    double cutoff = 0;
-    for (const Cutoff& each : cutoffs) cutoff += each.at / 4;
     for (std::size_t sample = 0; sample < map_.wavelengths; ++sample) {
-      const auto place = static_cast<double>(sample);
-      const bool is_lit = edge.is_within && (edge.lands_before ? place < cutoff : place > cutoff);
       Eigen::Vector2f at(0, 0);
       RayEnd end = RayEnd::plate;
-      for (std::size_t i = 0; i < 4; ++i) {
-        const std::uint32_t corner = quad.corners[i];
-        const bool lands = map_.landed(corner, sample);
-        if (!lands && !is_lit) end = map_.ends[corner * map_.wavelengths + sample];
-        at += lands || !is_lit
-                  ? Eigen::Vector2f(map_.landing(corner, sample) / 4)
-                  : Eigen::Vector2f(
-                        landing_beyond(map_, corner, cutoffs[i], place, quad.corners.data(), 4).cast<float>() / 4);
+      for (const std::uint32_t corner : quad.corners) {
+        at += map_.landing(corner, sample) / 4;
+        if (!map_.landed(corner, sample)) end = map_.ends[corner * map_.wavelengths + sample];
       }
       map_.landings.push_back(at);
       map_.ends.push_back(end);
