@@ -29,8 +29,9 @@ ShadowEdge edge_between(const Cutoff* cutoffs, std::size_t count) {
   return edge.is_known ? edge : ShadowEdge();
 }
 
-Eigen::Vector2d landing_beyond(const FlowMap& map, std::size_t vertex, const Cutoff& cutoff, double sample,
-                               const std::uint32_t* others, std::size_t count) {
+Eigen::Vector2d landing_beyond(const FlowMap& map, std::size_t vertex, double sample, const std::uint32_t* others,
+                               std::size_t count) {
+  const Cutoff cutoff = cutoff_of(map, vertex);
   const double last = cutoff.kind == Kind::before ? cutoff.at - 0.5 : cutoff.at + 0.5;
   Eigen::Vector2d moved(0, 0);
   int landed = 0;
@@ -57,7 +58,7 @@ std::optional<std::array<LitTriangle, 2>> lit_part(const FlowMap& map, const std
     const FlowLanding landing = landing_at(map, vertices[i], sample);
     const bool lands = landing.end == RayEnd::plate;
     depth[i] = edge.lands_before ? place - sample : sample - place;
-    at[i] = lands ? landing.at : landing_beyond(map, vertices[i], cutoffs[i], sample, vertices.data(), 3);
+    at[i] = lands ? landing.at : landing_beyond(map, vertices[i], sample, vertices.data(), 3);
     lit += lands;
   }
   if (lit == 0 || lit == 3) return std::nullopt;

@@ -41,8 +41,8 @@ ShadowEdge edge_between(const Cutoff* cutoffs, std::size_t count);
 
 /// Where light of a vertex with a single cutoff would land at a place beyond this, if it moved on from there like light
 /// of those `others` that lands at both.
-Eigen::Vector2d landing_beyond(const FlowMap& map, std::size_t vertex, const Cutoff& cutoff, double sample,
-                               const std::uint32_t* others, std::size_t count);
+Eigen::Vector2d landing_beyond(const FlowMap& map, std::size_t vertex, double sample, const std::uint32_t* others,
+                               std::size_t count);
 
 /// A part of a triangle's light, between its landings.
 struct LitTriangle {

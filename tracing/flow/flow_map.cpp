@@ -33,8 +33,7 @@ constexpr double usual_tolerance = 0.5;  // Pixels.
 constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
                                 // its own way within a part of one.
 constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than this part of the tolerance is allowed.
-constexpr int edge_levels_left = 2;  // Where the edge of a shadow leaves the range, quads stop so many divisions before
-                                     // the last one.
+constexpr int spared_levels = 2;       // The last divisions, of quads where the edge of a shadow leaves the range.
 constexpr int max_levels = 14;
 constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
 
@@ -355,13 +354,12 @@ class FlowMapBuilder {
     for (std::size_t sample = 0; sample < map().wavelengths; sample += map().check_step) {
       const Reach reach = reach_of(quad.corners, sample);
       if (!is_on_plate(reach)) continue;
-      if (reach.landed < 4 && !edge.is_within)
-        return !edge.is_known || quad.level < lattice().levels - edge_levels_left;
+      if (reach.landed < 4 && !edge.is_within) return !edge.is_known || quad.level < lattice().levels - spared_levels;
       extent = std::max(extent, (reach.high - reach.low).maxCoeff());
       if (reach.landed == 4) {
-        width = std::min(width, width_of(quad, reach, sample));
         last = map().landing(quad.corners[0], sample);
-        if (!is_seen) first = last;
+        if (!std::isfinite(width)) first = last;
+        width = std::min(width, width_of(quad, reach, sample));
       }
       is_seen = true;
     }
@@ -450,9 +448,7 @@ class FlowMapBuilder {
       const bool lands = map().landed(corner, sample);
       if (!lands && !edge.is_within) return unknown;
       at[i] = lands ? map().landing(corner, sample)
-                    : landing_beyond(map(), corner, cutoff_of(map(), corner), static_cast<double>(sample),
-                                     quad.corners.data(), 4)
-                          .cast<float>();
+                    : landing_beyond(map(), corner, static_cast<double>(sample), quad.corners.data(), 4).cast<float>();
     }
     const auto [u, v] = middle_of(quad);
     const auto between = [](const Eigen::Vector2f& from, const Eigen::Vector2f& to, float part) {

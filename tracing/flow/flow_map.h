@@ -132,8 +132,9 @@ inline bool jumps(bool is_torn, const Eigen::Vector2d& a, const Eigen::Vector2d&
 ///
 /// The mesh begins as a lattice of quads; an aperture that is no parallelogram has a lattice for each corner. A quad is
 /// divided into four while its error is likely to be too great, or if light of some of its corners lands and that of
-/// others does not, and where it ends is not known (cutoff.h), down to the finest size. A range has 33 wavelength samples, of which most are predicted where
-/// landings are smooth (wavelength_tracer.h). docs/dev/flow_maps.md has the rules, with equations.
+/// others does not, and where it ends is not known (cutoff.h), down to the finest size. A range has 33 wavelength
+/// samples, of which most are predicted where landings are smooth (wavelength_tracer.h). docs/dev/flow_maps.md has the
+/// rules, with equations.
 ///
 /// If `geometry` has a body instead of a plate, the landings of light from the volume are the projections of the points
 /// of the body on `settings.plate`: along its normal, or from the beam's source if it has one. Light counts as landed
