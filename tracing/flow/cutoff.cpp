@@ -1,5 +1,7 @@
 #include "tracing/flow/cutoff.h"
 
+#include <algorithm>
+
 namespace tensorray {
 
 using Kind = Cutoff::Kind;
