@@ -56,8 +56,8 @@ struct CausticSettings {
 /// moves little and always ends on the same thing, several bands in a row are drawn as one; where it moves far, a
 /// band is drawn at most 16 times (6, if it does not always end on the same thing). If not all corners of a triangle
 /// land, it is cut along the edge of the shadow (lit_part); where this is not known, each corner takes a third of the
-/// light. That of a corner on the plate is spread over the triangles beside it that land, or if there are none, it is in
-/// the pixel where the corner lands. So is that of small triangles at a tear. What lands beside the plate counts as
+/// light. That of a corner on the plate is spread over the triangles beside it that land, or if there are none, it is
+/// in the pixel where the corner lands. So is that of small triangles at a tear. What lands beside the plate counts as
 /// missed.
 /// @param plate  The plate of the map.
 /// @param bands  In the order of their places, without gaps between those that have a width.
