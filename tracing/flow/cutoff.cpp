@@ -49,23 +49,25 @@ Eigen::Vector2d landing_beyond(const FlowMap& map, std::size_t vertex, double sa
 std::optional<std::array<LitTriangle, 2>> lit_part(const FlowMap& map, const std::array<std::uint32_t, 3>& vertices,
                                                    const std::array<Cutoff, 3>& cutoffs, double sample) {
   const ShadowEdge edge = edge_between(cutoffs.data(), 3);
-  if (!edge.is_known) return std::nullopt;
-  std::array<double, 3> depth{};  // How far a corner is on the lit side, in samples.
-  std::array<Eigen::Vector2d, 3> at;
+  std::array<FlowLanding, 3> landings;
   int lit = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    if (cutoffs[i].kind == Kind::never) return std::nullopt;
-    const double beyond = edge.lands_before ? static_cast<double>(map.wavelengths) - 0.5 : -0.5;
-    const double place = cutoffs[i].is_single() ? cutoffs[i].at : beyond;
-    const FlowLanding landing = landing_at(map, vertices[i], sample);
-    const bool lands = landing.end == RayEnd::plate;
-    depth[i] = edge.lands_before ? place - sample : sample - place;
-    at[i] = lands ? landing.at : landing_beyond(map, vertices[i], sample, vertices.data(), 3);
-    lit += lands;
+    landings[i] = landing_at(map, vertices[i], sample);
+    lit += landings[i].end == RayEnd::plate;
+    if (!edge.is_known || cutoffs[i].kind == Kind::never) return std::nullopt;
   }
   if (lit == 0 || lit == 3) return std::nullopt;
+  std::array<double, 3> depth{};  // How far a corner is on the lit side, in samples.
+  std::array<Eigen::Vector2d, 3> at;
+  const double beyond = edge.lands_before ? static_cast<double>(map.wavelengths) - 0.5 : -0.5;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double place = cutoffs[i].is_single() ? cutoffs[i].at : beyond;
+    depth[i] = edge.lands_before ? place - sample : sample - place;
+    at[i] = landings[i].end == RayEnd::plate ? landings[i].at
+                                             : landing_beyond(map, vertices[i], sample, vertices.data(), 3);
+  }
   std::size_t alone = 0;  // The corner that has no other one on its side of the edge.
-  while ((landing_at(map, vertices[alone], sample).end == RayEnd::plate) != (lit == 1)) ++alone;
+  while ((landings[alone].end == RayEnd::plate) != (lit == 1)) ++alone;
   const std::size_t next = (alone + 1) % 3, last = (alone + 2) % 3;
   const auto part_to = [&](std::size_t other) { return depth[alone] / (depth[alone] - depth[other]); };
   const double to_next = part_to(next), to_last = part_to(last);
