@@ -49,12 +49,14 @@ Eigen::Vector2d landing_beyond(const FlowMap& map, std::size_t vertex, double sa
 std::optional<std::array<LitTriangle, 2>> lit_part(const FlowMap& map, const std::array<std::uint32_t, 3>& vertices,
                                                    const std::array<Cutoff, 3>& cutoffs, double sample) {
   const ShadowEdge edge = edge_between(cutoffs.data(), 3);
+  const bool is_dark =
+      std::any_of(cutoffs.begin(), cutoffs.end(), [](const Cutoff& cutoff) { return cutoff.kind == Kind::never; });
+  if (!map.is_range() || !edge.is_known || is_dark) return std::nullopt;
   std::array<FlowLanding, 3> landings;
   int lit = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     landings[i] = landing_at(map, vertices[i], sample);
     lit += landings[i].end == RayEnd::plate;
-    if (!edge.is_known || cutoffs[i].kind == Kind::never) return std::nullopt;
   }
   if (lit == 0 || lit == 3) return std::nullopt;
   std::array<double, 3> depth{};  // How far a corner is on the lit side, in samples.

@@ -5,10 +5,17 @@
 
 #include <tbb/parallel_for.h>
 
+#include "base/geometry/box.h"
+
 namespace tensorray {
 namespace {
 
 constexpr int max_columns = 1 << 12;  // Number of first quads along a side.
+
+// Sides of first quads, for the usual tolerance: so many pixels of straight light, or a voxel of the finest level.
+constexpr double first_pixels = 8;
+constexpr double max_for_voxels = 64;    // Voxels ask for no more quads than this along a side.
+constexpr double usual_tolerance = 0.5;  // Pixels.
 
 bool is_parallelogram(const std::vector<Eigen::Vector2d>& polygon) {
   if (polygon.size() != 4) return false;
@@ -221,6 +228,23 @@ std::vector<Eigen::Vector2d> part_left_of(const Eigen::Vector2d& from, const Eig
 }
 
 }  // namespace
+
+double pixel_of_starts(const Plate& plate, const Beam& beam) {
+  const double slope =
+      std::abs(plate.normal().dot(beam.direction)) / std::abs(beam.right.cross(beam.up).dot(beam.direction));
+  return start_ratio(beam, plate.center) * std::sqrt(plate.pixel_area() * std::clamp(slope, 1e-6, 1e6));
+}
+
+double first_size(const TensorField& field, const Beam& beam, double pixel, const FlowSettings& settings) {
+  const Eigen::Vector2d extent = box_of(core_of(beam)).sizes();
+  const double voxel =
+      std::ldexp(start_ratio(beam, field.world_box().center()) * field.to_world().linear().colwise().norm().minCoeff(),
+                 1 - field.levels());
+  const double for_voxels = std::max(voxel, extent.maxCoeff() / max_for_voxels);
+  const double usual = std::min(first_pixels * pixel, for_voxels);
+  const double least = std::sqrt(16 * box_of(beam.aperture).sizes().prod() / static_cast<double>(settings.max_starts));
+  return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
+}
 
 std::vector<Patch> patches_around(const std::vector<Eigen::Vector2d>& inner, const std::vector<Eigen::Vector2d>& outer,
                                   double quad_size) {

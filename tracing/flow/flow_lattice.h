@@ -27,6 +27,14 @@ struct Patch {
   }
 };
 
+/// The size of a pixel in the plane where light starts, as straight light projects it.
+double pixel_of_starts(const Plate& plate, const Beam& beam);
+
+/// The size of the first quads, world units. The error of landings between vertices is of second order, so that a finer
+/// tolerance has smaller quads. If few vertices are allowed, quads are large: a quarter of the vertices is for the
+/// first quads and their first division.
+double first_size(const TensorField& field, const Beam& beam, double pixel, const FlowSettings& settings);
+
 /// Patches that cover a convex polygon: one for a parallelogram; else one for each corner, which reaches to the middles
 /// of the corner's sides and to that of the polygon. Their first quads are no greater than `quad_size`, but there are
 /// at most 4096 along a side.

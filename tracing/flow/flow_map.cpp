@@ -24,11 +24,7 @@ namespace {
 
 constexpr double margin = 1.0 / 8;  // Extension of the plate on each side, in sizes of the plate.
 
-// Sides of first quads, for the usual tolerance: so many pixels of straight light, or a voxel of the finest level.
-constexpr double first_pixels = 8;
-constexpr double max_for_voxels = 64;    // Voxels ask for no more quads than this along a side.
-constexpr double most_around = 64;       // First quads along the beam, of light beside its core: it is straight.
-constexpr double usual_tolerance = 0.5;  // Pixels.
+constexpr double most_around = 64;  // First quads along the beam, of light beside its core: it is straight.
 
 constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
                                 // its own way within a part of one.
@@ -39,27 +35,6 @@ constexpr int block_size = 4;  // A shard has blocks of so many first quads alon
 
 /// Vertices in the middles of a quad's sides, counter-clockwise from the lower one, and in its own.
 using Middles = std::array<std::uint32_t, 5>;
-
-/// The size of a pixel in the plane where light starts, as straight light projects it.
-double pixel_of_starts(const Plate& plate, const Beam& beam) {
-  const double slope =
-      std::abs(plate.normal().dot(beam.direction)) / std::abs(beam.right.cross(beam.up).dot(beam.direction));
-  return start_ratio(beam, plate.center) * std::sqrt(plate.pixel_area() * std::clamp(slope, 1e-6, 1e6));
-}
-
-/// The size of the first quads, world units. The error of landings between vertices is of second order, so that a finer
-/// tolerance has smaller quads. If few vertices are allowed, quads are large: a quarter of the vertices is for the
-/// first quads and their first division.
-double first_size(const TensorField& field, const Beam& beam, double pixel, const FlowSettings& settings) {
-  const Eigen::Vector2d extent = box_of(core_of(beam)).sizes();
-  const double voxel =
-      std::ldexp(start_ratio(beam, field.world_box().center()) * field.to_world().linear().colwise().norm().minCoeff(),
-                 1 - field.levels());
-  const double for_voxels = std::max(voxel, extent.maxCoeff() / max_for_voxels);
-  const double usual = std::min(first_pixels * pixel, for_voxels);
-  const double least = std::sqrt(16 * box_of(beam.aperture).sizes().prod() / static_cast<double>(settings.max_starts));
-  return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
-}
 
 /// What the landings of a vertex depend on, beside the map's settings: where its light starts, in the beam's frame.
 using VertexKey = std::array<double, 2>;
@@ -338,7 +313,7 @@ class FlowMapBuilder {
     const float tolerance = static_cast<float>(settings_.tolerance), pixel = 1;
     if (!settings_.silhouette) return tolerance * std::sqrt(std::max(extent, pixel));
     const float size = std::ldexp(first_size_, -quad.level);
-    if (!std::isfinite(width)) width = size;  // Of all of its light, a part does not land.
+    if (!std::isfinite(width)) width = size;  // At each sample, a part of its light does not land.
     return tolerance * std::max(width / size, gathered_part) *
            std::cbrt(std::max(sweep / std::max(width, pixel), 1.0f));
   }
@@ -370,7 +345,7 @@ class FlowMapBuilder {
   /// The edge of a shadow between vertices. Maps that are not drawn as light have no use for it.
   template <std::size_t count>
   ShadowEdge edge_of(const std::array<std::uint32_t, count>& vertices) const {
-    if (!settings_.silhouette || map().check_step == 1) return {};
+    if (!settings_.silhouette || !map().is_range()) return {};
     return edge_between(cutoffs_of(map(), vertices).data(), count);
   }
 

@@ -97,6 +97,7 @@ struct FlowMap {
   Eigen::Vector2f landing(std::size_t vertex, std::size_t sample) const {
     return landings[vertex * wavelengths + sample];
   }
+  bool is_range() const { return check_step > 1; }  ///< Whether the samples are those of a range that is not empty.
   std::size_t checks() const { return (wavelengths - 1) / check_step + 1; }  ///< Number of samples with lengths.
 };
 

@@ -173,45 +173,58 @@ TEST(Caustic, LightBesideAShadowMakesNoDots) {
   EXPECT_LT(brightest * unit_plate().pixel_area(), 2.1 / (60 * 60));
 }
 
-/// A shadow whose edge is a straight line that moves with the wavelength, and light that moves with it, too. Of any
+/// A shadow whose edge is a straight line that moves with the wavelength, and light that moves with it, too. At any
 /// place among the samples, light is exactly that beside the edge, within quads of eight pixels.
 TEST(Caustic, TheEdgeOfAShadowIsExactBetweenVertices) {
-  constexpr int count = 8, samples = 33;
+  constexpr int samples = 33;
+  const auto edge = [](double sample, double y) { return (sample + 0.5) / (samples - 1) + y / 4; };
   for (const bool is_mirrored : {false, true}) {
-    FlowMap map =
-        lattice_map(count, 0, 1, [](const Vector2d& at) { return Vector2d(2 + 50 * at.x(), 2 + 60 * at.y()); });
+    FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(2 + 50 * at.x(), 2 + 60 * at.y()); });
     std::vector<Eigen::Vector2f> landings;
     map.ends.clear();
     for (std::size_t i = 0; i < map.starts.size(); ++i)
       for (int k = 0; k < samples; ++k) {
         const int sample = is_mirrored ? samples - 1 - k : k;
-        const double edge = (sample + 0.5) / (samples - 1) + map.starts[i].y() / 4;
-        map.ends.push_back(map.starts[i].x() > edge ? RayEnd::plate : RayEnd::obstacle);
+        map.ends.push_back(map.starts[i].x() > edge(sample, map.starts[i].y()) ? RayEnd::plate : RayEnd::obstacle);
         landings.push_back(map.landings[i] + Eigen::Vector2f(0.2f * static_cast<float>(sample), 0));
       }
     map.landings = landings;
     map.wavelengths = samples;
+    map.check_step = 8;
     for (const double sample :
          {10.2, 14.3, 15.5}) {  // The edge is between vertices that are neither lit nor dark at all.
-      CausticBand band;
-      band.sample = is_mirrored ? samples - 1 - sample : sample;
+      const CausticBand band{is_mirrored ? samples - 1 - sample : sample};
       const Caustic caustic = draw_caustic(map, unit_plate(), {band}, {}, Progress());
-      const auto edge = [&](double y) { return (sample + 0.5) / (samples - 1) + y / 4; };
-      EXPECT_NEAR(power_of(caustic, RayEnd::plate), 1 - edge(0.5), 1e-6) << sample;
-      EXPECT_NEAR(power_of(caustic, RayEnd::obstacle), edge(0.5), 1e-6) << sample;
+      EXPECT_NEAR(power_of(caustic, RayEnd::plate), 1 - edge(sample, 0.5), 1e-6) << sample;
+      EXPECT_NEAR(power_of(caustic, RayEnd::obstacle), edge(sample, 0.5), 1e-6) << sample;
       for (int row = 2; row < 62; ++row) {
-        const double at = edge((row + 0.5 - 2) / 60), first = 2 + 50 * at + 0.2 * sample;
+        const double at = edge(sample, (row + 0.5 - 2) / 60), first = 2 + 50 * at + 0.2 * sample;
         const double* const light = &caustic.irradiance.values[static_cast<std::size_t>(row * pixels)];
-        double lit = 0, before = 0;
-        for (int x = 0; x < pixels; ++x) {
-          lit += light[x] * unit_plate().pixel_area();
-          if (x + 2 < first) before = std::max(before, light[x]);
-        }
+        for (int x = 0; x + 2 < first; ++x) EXPECT_LT(light[x], 1e-6) << sample << " row " << row;
+        const double lit = std::accumulate(light, light + pixels, 0.0) * unit_plate().pixel_area();
         EXPECT_NEAR(lit, (1 - at) / 60, 1e-7) << sample << " row " << row;
-        EXPECT_LT(before, 1e-6) << sample << " row " << row;
       }
     }
   }
+}
+
+/// What other wavelengths meet says nothing of one, unless all are of a range.
+TEST(Caustic, SeparateWavelengthsHaveSeparateShadows) {
+  FlowMap alone = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(2 + 60 * at.x(), 2 + 60 * at.y()); });
+  FlowMap both = alone;
+  both.wavelengths = 2;
+  both.landings.clear();
+  both.ends.clear();
+  for (std::size_t i = 0; i < alone.starts.size(); ++i) {
+    const double x = alone.starts[i].x();
+    if (x > 0.5) alone.ends[i] = RayEnd::obstacle;
+    both.landings.insert(both.landings.end(), 2, alone.landings[i]);
+    both.ends.insert(both.ends.end(), {alone.ends[i], x > 0.2 ? RayEnd::obstacle : RayEnd::plate});
+  }
+  const auto light = [](const FlowMap& map) {
+    return draw_caustic(map, unit_plate(), {CausticBand{}}, {}, Progress());
+  };
+  EXPECT_EQ(light(alone).irradiance.values, light(both).irradiance.values);
 }
 
 /// Light of a wavelength that nobody sees has power, too.
