@@ -10,25 +10,29 @@ Cutoff cutoff_of(const FlowMap& map, std::size_t vertex) {
   const bool lands = map.landed(vertex, 0);
   Cutoff cutoff{lands ? Kind::always : Kind::never};
   for (std::size_t sample = 0; sample < map.wavelengths; ++sample) {
-    if (map.ends[vertex * map.wavelengths + sample] == RayEnd::side) return {};
+    cutoff.by_side |= map.ends[vertex * map.wavelengths + sample] == RayEnd::side;
     if (sample == 0 || map.landed(vertex, sample) == map.landed(vertex, sample - 1)) continue;
-    if (cutoff.is_single()) return {};
-    cutoff = {lands ? Kind::before : Kind::after, static_cast<double>(sample) - 0.5};
+    const bool is_first = cutoff.kind == Kind::always || cutoff.kind == Kind::never;
+    cutoff.kind = !is_first ? Kind::other : lands ? Kind::before : Kind::after;
+    cutoff.at = static_cast<double>(sample) - 0.5;
   }
   return cutoff;
 }
 
 ShadowEdge edge_between(const Cutoff* cutoffs, std::size_t count) {
-  ShadowEdge edge{false, true};
+  ShadowEdge edge;
+  std::size_t single = 0, before = 0;
+  bool is_mixed = false;
   for (std::size_t i = 0; i < count; ++i) {
-    const Cutoff& cutoff = cutoffs[i];
-    const bool lands_before = cutoff.kind == Kind::before;
-    if (cutoff.kind == Kind::other || (cutoff.is_single() && edge.is_known && edge.lands_before != lands_before))
-      return {};
-    edge.is_within = edge.is_within && cutoff.is_single();
-    if (cutoff.is_single()) edge = {true, edge.is_within, lands_before};
+    single += cutoffs[i].is_single();
+    before += cutoffs[i].kind == Kind::before;
+    is_mixed |= cutoffs[i].kind == Kind::other;
+    edge.by_side |= cutoffs[i].by_side;
   }
-  return edge.is_known ? edge : ShadowEdge();
+  edge.lands_before = before > 0;
+  edge.is_known = single > 0 && !is_mixed && (before == 0 || before == single);
+  edge.is_within = edge.is_known && single == count;
+  return edge;
 }
 
 Eigen::Vector2d landing_beyond(const FlowMap& map, std::size_t vertex, double sample, const std::uint32_t* others,

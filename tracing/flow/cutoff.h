@@ -13,9 +13,9 @@ namespace tensorray {
 
 struct Cutoff {
   enum class Kind { never, always, before, after, other };
-  Kind kind = Kind::other;  ///< Light lands at no sample, at all, at those before or after `at`; or here and there. Of
-                            ///< light that leaves by a side face: `other`, as beside it landings bend like a root.
+  Kind kind = Kind::other;  ///< Light lands at no sample, at all, at those before or after `at`; or here and there.
   double at = 0;            ///< Halfway between two samples.
+  bool by_side = false;     ///< Whether light of a sample leaves by a side face: beside it, landings bend like a root.
 
   bool is_single() const { return kind == Kind::before || kind == Kind::after; }
 };
@@ -35,6 +35,7 @@ struct ShadowEdge {
                            ///< dark at all samples.
   bool is_within = false;  ///< Whether all vertices have such cutoffs.
   bool lands_before = false;
+  bool by_side = false;  ///< Whether light of a vertex leaves by a side face.
 };
 
 ShadowEdge edge_between(const Cutoff* cutoffs, std::size_t count);

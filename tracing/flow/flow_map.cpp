@@ -329,7 +329,8 @@ class FlowMapBuilder {
     for (std::size_t sample = 0; sample < map().wavelengths; sample += map().check_step) {
       const Reach reach = reach_of(quad.corners, sample);
       if (!is_on_plate(reach)) continue;
-      if (reach.landed < 4 && !edge.is_within) return !edge.is_known || quad.level < lattice().levels - spared_levels;
+      if (reach.landed < 4 && (!edge.is_within || edge.by_side))
+        return quad.level < lattice().levels - (edge.is_known || edge.by_side ? spared_levels : 0);
       extent = std::max(extent, (reach.high - reach.low).maxCoeff());
       if (reach.landed == 4) {
         last = map().landing(quad.corners[0], sample);
@@ -338,6 +339,9 @@ class FlowMapBuilder {
       }
       is_seen = true;
     }
+    // Of light on a plate, the last division is for edges alone: where all lands, but roughly, it shows hardly more.
+    const bool is_for_edges = settings_.silhouette && quad.level + 1 == lattice().levels;
+    if (is_for_edges && std::isfinite(quad.error)) return false;
     const float sweep = settings_.range ? (last - first).norm() : 0;
     return is_seen && quad.error > error_bound(quad, extent, width, sweep);
   }

@@ -10,7 +10,8 @@
 namespace tensorray {
 namespace {
 
-constexpr double prediction_part = 2;  // Middles of gaps are predicted to within the tolerance divided by this.
+constexpr double prediction_part = 2;  // Middles of gaps are predicted to within the tolerance divided by this, ...
+constexpr float of_last_gaps = 4;      // ... and to so many times of that where halves have a single sample between.
 constexpr double off_surface = 1e-4;   // Distance, in sizes of a body, at which it is looked for about its own points.
 
 constexpr int last_sample = range_samples - 1;
@@ -70,7 +71,8 @@ void WavelengthPrediction::go_on() {
   std::vector<Gap> rest;
   for (const Gap& gap : open_) {
     const int middle = gap.middle();
-    const bool is_smooth = landed(middle) && (predicted(middle) - landings_[middle]).norm() <= tolerance_;
+    const float bound = gap.to - gap.from > 4 ? tolerance_ : of_last_gaps * tolerance_;
+    const bool is_smooth = landed(middle) && (predicted(middle) - landings_[middle]).norm() <= bound;
     for (const auto& [from, to] : {Gap{gap.from, middle}, Gap{middle, gap.to}}) {
       const bool is_known = landed(from) && landed(to) ? is_smooth : !is_on_plate(from) && !is_on_plate(to);
       if (to - from > 1 && !is_known) rest.push_back({from, to});

@@ -39,12 +39,6 @@ struct PacketMedium {
   LeafBrick leaf(const std::int32_t at[3], const std::array<float, 3>& position) const {
     return field.leaf({at[0], at[1], at[2]}, position);
   }
-  /// Whether a step from a brick may meet a surface.
-  bool near_surface(const std::int32_t at[3]) const {
-    bool near = true;
-    for (int axis = 0; axis < 3; ++axis) near &= at[axis] >= first_near[axis] && at[axis] <= last_near[axis];
-    return near;
-  }
 };
 
 /// From this ‖σ h T‖ on, the norm of a kick is computed; below, its bound in the brick is used.

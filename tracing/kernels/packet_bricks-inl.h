@@ -116,9 +116,13 @@ HWY_INLINE void summarize(const PacketMedium& medium, Packet& packet) {
   find_extent(medium, packet);
   packet.near_surface = false;
   if (!medium.settings.geometry) return;
-  for (int lane = 0; lane < packet.vectors * lanes; ++lane) {
-    const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
-    packet.near_surface |= medium.near_surface(at);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const auto is_far = [&](int axis) HWY_ATTR {
+      const auto at = hn::Load(ints, packet.brick[axis] + i);
+      return hn::Or(hn::Lt(at, hn::Set(ints, medium.first_near[axis])),
+                    hn::Gt(at, hn::Set(ints, medium.last_near[axis])));
+    };
+    packet.near_surface |= !hn::AllTrue(ints, hn::Or(is_far(0), hn::Or(is_far(1), is_far(2))));
   }
 }
 
