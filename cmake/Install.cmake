@@ -16,7 +16,7 @@ foreach(program tensorray tensorray-import tensorray-view)
 endforeach()
 install(DIRECTORY ${CMAKE_BINARY_DIR}/view DESTINATION ${CMAKE_INSTALL_DATADIR}/tensorray COMPONENT programs OPTIONAL)
 install(DIRECTORY scenes/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/scenes COMPONENT programs
-        FILES_MATCHING PATTERN "*.json" PATTERN "data/*" PATTERN "*.view.json" EXCLUDE)
+        FILES_MATCHING PATTERN "*.json" PATTERN "data/*" PATTERN "*.tar.xz" EXCLUDE PATTERN "*.view.json" EXCLUDE)
 
 if(TARGET _tensorray)
   # Debian's python3 looks into another folder under /usr than elsewhere.

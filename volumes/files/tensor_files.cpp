@@ -320,7 +320,8 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
   }
 }
 
-void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool is_half, bool zip) {
+void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool is_half,
+                      VdbCompression compression) {
   if (is_half) check_half_range(path, grid);
   std::vector<WrittenGrid> rows;
   for (std::size_t level = 0; level <= grid.finer.size(); ++level)
@@ -330,7 +331,7 @@ void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid,
   openvdb::MetaMap metadata;
   for (const auto& [key, value] : grid.metadata)
     if (key != length_unit_key) metadata.insertMeta(key, openvdb::StringMetadata(value));
-  write_vdb(path, rows, metadata, zip);
+  write_vdb(path, rows, metadata, compression);
 }
 
 void write_scalar_vdb(const std::filesystem::path& path, const std::vector<ScalarGrid>& grids,

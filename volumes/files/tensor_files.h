@@ -8,6 +8,7 @@
 
 #include "volumes/files/grid_layouts.h"
 #include "volumes/grids/block_source.h"
+#include "volumes/vdb/vdb_compression.h"
 
 namespace tensorray {
 
@@ -37,10 +38,10 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
 /// Equal grids give equal bytes. Writes the file in place, block by block, so that memory does not hold the
 /// field twice.
 /// @param half  Store 16-bit floats: three significant digits between 6e-5 and 65504, steps of 6e-8 below.
-/// @param zip  Compress with zlib, which makes files smaller where components are rounded.
 /// @throw std::runtime_error naming the file and the reason (also when the disk is full; with `half`, when a value
 /// exceeds 65504).
-void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half = false, bool zip = false);
+void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half = false,
+                      VdbCompression compression = VdbCompression::blosc);
 
 /// The grids of a file, in the file's order. @throw std::runtime_error as open_tensor_vdb.
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path);

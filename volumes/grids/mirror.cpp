@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 #include <set>
@@ -69,22 +70,27 @@ class MirroredLevel {
 
   /// The shapes of the whole level.
   std::vector<BlockShape> shapes() const {
+    constexpr int none = std::numeric_limits<int>::max();  // No block begins there.
     std::map<Key, BlockShape> all;
-    const auto add = [&](const Vector3i& voxel) {
+    const auto shape_at = [&](const Vector3i& origin) -> BlockShape* {
       // The image of the first face of a brick is that of the next one, which need not be refined.
-      if (brick_ > 0 && refined_.count(key_of(brick_of(voxel))) == 0) return;
-      const Vector3i origin = origin_of(voxel);
+      if (brick_ > 0 && refined_.count(key_of(brick_of(origin))) == 0) return nullptr;
       BlockShape& shape = all[key_of(origin)];
       shape.origin = origin;
-      const Vector3i at = voxel - origin;
-      shape.active.set(static_cast<std::size_t>(TensorBlock::offset(at.x(), at.y(), at.z())));
+      return &shape;
     };
-    for (const BlockShape& shape : half_)
-      for (int i = 0; i < TensorBlock::voxels; ++i)
-        if (shape.active[static_cast<std::size_t>(i)]) {
-          add(shape.origin + TensorBlock::position(i));
-          add(reflection_(shape.origin + TensorBlock::position(i)));
-        }
+    for (const BlockShape& half : half_) {
+      if (BlockShape* const shape = shape_at(half.origin)) shape->active |= half.active;
+      BlockShape* image = nullptr;
+      Vector3i origin = Vector3i::Constant(none);  // Of the image's block.
+      for (int i = 0; i < TensorBlock::voxels; ++i) {
+        if (!half.active[static_cast<std::size_t>(i)]) continue;
+        const Vector3i voxel = reflection_(half.origin + TensorBlock::position(i));
+        if (origin_of(voxel) != origin) image = shape_at(origin = origin_of(voxel));
+        const Vector3i at = voxel - origin;
+        if (image) image->active.set(static_cast<std::size_t>(TensorBlock::offset(at.x(), at.y(), at.z())));
+      }
+    }
     std::vector<BlockShape> result;
     for (const auto& [key, shape] : all) result.push_back(shape);
     return result;

@@ -241,8 +241,10 @@ class Reader : private openvdb::io::Archive {
 
 class Writer : private openvdb::io::Archive {
  public:
-  explicit Writer(bool zip) {
-    if (zip) setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
+  explicit Writer(VdbCompression compression) {
+    using namespace openvdb::io;
+    if (compression == VdbCompression::zip) setCompression(COMPRESS_ZIP | COMPRESS_ACTIVE_MASK);
+    if (compression == VdbCompression::none) setCompression(COMPRESS_ACTIVE_MASK);
   }
 
   void write_file(std::fstream& file, const std::vector<WrittenGrid>& grids, const openvdb::MetaMap& metadata) {
@@ -361,7 +363,7 @@ VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>&
 void fail_damaged_voxels(const std::filesystem::path& path) { fail_damaged(path, ""); }
 
 void write_vdb(const std::filesystem::path& path, const std::vector<WrittenGrid>& grids,
-               const openvdb::MetaMap& metadata, bool zip) {
+               const openvdb::MetaMap& metadata, VdbCompression compression) {
   openvdb::initialize();
   std::vector<char> buffer(stream_buffer);
   std::fstream file;
@@ -370,7 +372,7 @@ void write_vdb(const std::filesystem::path& path, const std::vector<WrittenGrid>
   try {
     file.exceptions(any_failure);
     file.open(path, std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
-    Writer(zip).write_file(file, grids, metadata);
+    Writer(compression).write_file(file, grids, metadata);
     file.close();
   } catch (const std::ios_base::failure&) {
     fail(path, "cannot be written: " + (errno ? std::generic_category().message(errno) : "the write failed"));

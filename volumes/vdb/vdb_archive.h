@@ -20,6 +20,7 @@
 #include <Eigen/Geometry>
 #include <openvdb/openvdb.h>
 
+#include "volumes/vdb/vdb_compression.h"
 #include "volumes/vdb/vdb_tree_check.h"
 
 namespace tensorray {
@@ -83,12 +84,11 @@ struct WrittenGrid {
   openvdb::Index64 value_bytes = 0;  ///< What these values would take in memory.
 };
 
-/// Writes grids in place with OpenVDB's default compression, and adds their statistics to their metadata. Equal grids
+/// Writes grids in place, and adds their statistics to their metadata. Equal grids
 /// give equal bytes: the file's unique tag, which OpenVDB draws at random, is replaced by a hash of the contents.
 /// @throw std::runtime_error naming the file and the reason, also when the disk is full.
-/// @param zip  Compress with zlib instead: slower, and smaller where values have few different bytes.
 void write_vdb(const std::filesystem::path& path, const std::vector<WrittenGrid>& grids,
-               const openvdb::MetaMap& metadata, bool zip = false);
+               const openvdb::MetaMap& metadata, VdbCompression compression = VdbCompression::blosc);
 
 // Where the voxels of a grid are. OpenVDB refuses transforms whose determinant is below 3e-15, such as voxels of ten
 // micrometres in metres. Grids with smaller voxels are stored in a smaller unit of length, which their metadata have as

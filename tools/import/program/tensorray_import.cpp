@@ -48,10 +48,13 @@ constexpr double filled = 0.8;
 /// The greatest part of voxels with a negative eigenvalue that is no reason for a warning: noise makes some.
 constexpr double max_negative = 0.2;
 
+const std::vector<std::pair<std::string, VdbCompression>> compressions = {
+    {"blosc", VdbCompression::blosc}, {"zip", VdbCompression::zip}, {"none", VdbCompression::none}};
+
 struct ImportOptions {
   ImportSettings settings;
   ImportChoices choices;
-  std::string rounding;
+  std::string rounding, compression;
   std::filesystem::path output, boundary;
   std::string name, units, called;
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
@@ -215,7 +218,8 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
   for (const TensorBlocks* level : levels_of(grid)) blocks += level->size();
   const Eigen::Vector3i size = grid.active_box().sizes() + Eigen::Vector3i::Ones();
   output.write([&](const std::filesystem::path& path) {
-    write_tensor_vdb(path, grid, options.half, settings.sampling.rounding > 0);
+    const VdbCompression usual = settings.sampling.rounding > 0 ? VdbCompression::zip : VdbCompression::blosc;
+    write_tensor_vdb(path, grid, options.half, named(options.compression, compressions).value_or(usual));
   });
   bar.reset();
   tell_made(fmt::format("{}: field \"{}\", {} x {} x {} voxels, {}", options.output.string(), escaped(name), size.x(),
@@ -331,7 +335,7 @@ void add_options(CLI::App& program, Progress& progress) {
   program
       .add_option("--rounding", options->rounding,
                   "Round components to this part of the median norm at most, as 1%, and twice that at each level, and "
-                  "compress the file more: with --half it is a third as large")
+                  "compress the file with zip: with --half it is a third as large")
       ->option_text("PART");
   program
       .add_option("FILE", options->settings.files,
@@ -367,6 +371,10 @@ void add_options(CLI::App& program, Progress& progress) {
       ->option_text("SIZE");
   program.add_option("--name", options->name, "Name of the field (default: the array's)");
   program.add_option("--units", options->units, "Units of the tensor, noted in the file");
+  program
+      .add_option("--compression", options->compression,
+                  "Of the file's values (default: zip with --rounding, else blosc); none: for an archive, as .tar.xz")
+      ->check(CLI::IsMember(compressions));
   program.add_flag("--half", options->half, "Store 16-bit floats: three significant digits, half the size");
   program.add_flag("-q,--quiet", options->quiet, "No progress bar");
   program.add_flag("--tell-progress", options->tells_progress)->group("");  // For the Python package.
