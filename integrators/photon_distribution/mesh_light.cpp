@@ -96,7 +96,6 @@ FlowMap trace(const MeshJob& job, double tolerance, const Progress& progress) {
   settings.flexibilities = range.flexibilities;
   settings.range = range.is_range;
   settings.side_light = keeps_side_light(scene);
-  settings.memory = scene.rays;
   settings.job = job.job;
   settings.is_kept = true;
   if (job.show)

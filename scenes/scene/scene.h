@@ -21,7 +21,6 @@
 namespace tensorray {
 
 class KeptResults;
-class RayMemory;
 
 /// What the numbers of a field are; empty: not known.
 struct FieldUnits {
@@ -46,9 +45,6 @@ struct Scene {
   /// Bands of wavelengths, or in RGB mode the three primaries (wavelength 0).
   std::vector<Band> bands;
   std::vector<LightChannel> channels;  ///< Flexibility and power of each band.
-
-  /// Rays of the scene's light on the plate, kept from the scene before; null: none is kept.
-  std::shared_ptr<RayMemory> rays;
 
   std::shared_ptr<KeptResults> kept;  ///< Of the field; null: nothing is kept.
 

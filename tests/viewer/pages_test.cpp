@@ -337,26 +337,6 @@ TEST_F(LiveSceneTest, ARecolouredPictureIsNotRenderedAgain) {
   EXPECT_NE(live.render(progress_), render);
 }
 
-TEST_F(LiveSceneTest, RaysThroughTheVolumeAreKept) {
-  LiveScene live(scene_file());
-  Json scene = test::small_scene();
-  const auto samples = [&](LiveScene& of) {
-    of.load(scene, outputs_, progress_);
-    return of.render(progress_)->statistics.tensor_samples;
-  };
-  samples(live);
-  scene["output"]["white_balance"] = false;  // From now on the rays are remembered.
-  samples(live);
-  scene["light"]["wavelengths"]["count"] = 12;
-  EXPECT_EQ(samples(live), 0u);
-  scene["receiver"]["distance"] = 0.6;
-  LiveScene anew(scene_file());
-  EXPECT_LT(2 * samples(live), samples(anew));
-  scene["field"]["scale"] = 4.5;
-  LiveScene another(scene_file());
-  EXPECT_EQ(samples(live), samples(another));
-}
-
 TEST_F(LiveSceneTest, StaysAsItWasWhereASceneIsWrong) {
   LiveScene live(scene_file());
   Json scene = test::small_scene();

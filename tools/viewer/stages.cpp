@@ -8,7 +8,6 @@
 #include "integrators/methods/read_scene.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/scene/kept_results.h"
-#include "tracing/flow/ray_memory.h"
 
 namespace tensorray {
 namespace {
@@ -72,13 +71,6 @@ Json with_names(Json scene, const std::vector<std::filesystem::path>& outputs) {
   Json files = Json::array();
   for (const std::filesystem::path& output : outputs) files.push_back(output.string());
   return {std::move(scene), std::move(files)};
-}
-
-/// What the way of a ray through the volume depends on.
-Json ray_keys(const Json& json, const Scene& scene) {
-  const Eigen::Vector3d& V = scene.beam.direction;
-  return {
-      section(json, "field"), section(json, "world"), section(json, "bending"), scene.scale.scale, V.x(), V.y(), V.z()};
 }
 
 /// What the picture in linear light depends on.
@@ -172,10 +164,6 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
   if (chooses_direction && of_direction == of_direction_) description.light.direction = direction_;
 
   Scene scene = load_scene(description, progress, field_of(scene_, description));
-  // A change that moves all rays begins without a memory: it would cost time and give nothing.
-  const Json rays = ray_keys(json, scene);
-  if (rays == rays_of_) scene.rays = scene_ && scene_->rays ? scene_->rays : std::make_shared<RayMemory>();
-
   if (!scene.kept) scene.kept = std::make_shared<KeptResults>();
 
   // From here on nothing fails: the scene before is replaced as a whole.
@@ -186,7 +174,6 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
   loaded_ = loaded;
   of_scale_ = of_scale;
   of_direction_ = of_direction;
-  rays_of_ = rays;
   rendered_ = picture_keys(json, outputs);
   return *scene_;
 }

@@ -58,8 +58,6 @@ std::vector<std::filesystem::path> outputs_of(const SceneDescription& descriptio
 /// Renders one version of a scene after another, and keeps what a change leaves valid:
 /// - the field, while `field` changes only in `scale` and `bounds`;
 /// - what "auto" chose for scale and direction, while `field` (but `scale`), `light.direction` and `light.up` stay;
-/// - the rays of the light on a plate, up to where they leave the volume, while `field`, `bending` and the direction of
-///   the light stay;
 /// - what the method keeps of the field (KeptResults), while the field stays;
 /// - the picture in linear light, while `output` changes only in `exposure`, `display` and `view`.
 /// Each picture is the same, bit for bit, as if rendered from the beginning. One thread at a time may use it.
@@ -89,7 +87,6 @@ class LiveScene {
   std::optional<Scene> scene_;
   Json loaded_, rendered_;        ///< What scene and picture were made of.
   Json of_scale_, of_direction_;  ///< What the automatic choices depend on.
-  Json rays_of_;                  ///< What the rays depend on.
   std::optional<double> scale_;
   std::optional<Eigen::Vector3d> direction_;
   std::shared_ptr<const Render> render_;

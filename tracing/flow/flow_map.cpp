@@ -30,6 +30,7 @@ constexpr int edge_levels = 2;  // Divisions of first quads at the edge before t
                                 // its own way within a part of one.
 constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than this part of the tolerance is allowed.
 constexpr int spared_levels = 1;       // The last divisions, of quads where the edge of a shadow leaves the range.
+constexpr float torn_deviation = 8;    // Pixels; a quad that has more may be torn.
 constexpr int max_levels = 14;
 constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
 
@@ -339,9 +340,8 @@ class FlowMapBuilder {
       }
       is_seen = true;
     }
-    // Of light on a plate, the last division is for edges alone: where all lands, but roughly, it shows hardly more.
-    const bool is_for_edges = settings_.silhouette && quad.level + 1 == lattice().levels;
-    if (is_for_edges && std::isfinite(quad.error)) return false;
+    // Of light on a plate, the last division is for edges and tears alone: of rough light, it shows hardly more.
+    if (settings_.silhouette && quad.level + 1 == lattice().levels && quad.deviation <= torn_deviation) return false;
     const float sweep = settings_.range ? (last - first).norm() : 0;
     return is_seen && quad.error > error_bound(quad, extent, width, sweep);
   }

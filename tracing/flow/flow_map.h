@@ -6,7 +6,6 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -20,7 +19,6 @@
 namespace tensorray {
 
 class Job;
-class RayMemory;
 struct FlowMap;
 
 struct FlowSettings {
@@ -53,9 +51,6 @@ struct FlowSettings {
 
   /// Called after each division of quads, with a function that makes the map so far. Empty: nobody wants it.
   std::function<void(const std::function<FlowMap()>& so_far)> show;
-
-  /// Rays of maps that differ only in plate and range of flexibilities; null: none is remembered. The map is the same.
-  std::shared_ptr<RayMemory> memory;
 };
 
 /// A triangle of neighbouring vertices.

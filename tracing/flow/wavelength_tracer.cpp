@@ -4,7 +4,6 @@
 #include <numeric>
 #include <utility>
 
-#include "tracing/flow/ray_memory.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
@@ -115,12 +114,6 @@ WavelengthTracer::WavelengthTracer(const TensorField& field, const Geometry& geo
     const double part = static_cast<double>(i) / (range_samples - 1);
     flexibilities_[i] = (1 - part) * settings.flexibilities[0] + part * settings.flexibilities[1];
   }
-  if (settings.memory && !beam.source && RayMemory::serves(field, geometry, beam.direction, bending)) {
-    memory_ = settings.memory;
-    Surfaces volume = geometry.surfaces();
-    volume.plate.reset();
-    volume_.emplace(std::move(volume));
-  }
   if (geometry.surfaces().body) {
     Surfaces alone;
     alone.bounds = geometry.surfaces().bounds;
@@ -173,10 +166,7 @@ void WavelengthTracer::trace_rays(FlowMap& map, const std::vector<NewVertex>& ve
     const Eigen::Vector3d& origin = vertices[ray.vertex].origin;
     batch.add(origin, beam_.direction_at(origin), flexibilities_[ray.sample]);
   }
-  if (memory_)
-    memory_->trace(field_, *volume_, geometry_, bending_, batch);
-  else
-    tensorray::trace(field_, geometry_, bending_, batch);
+  tensorray::trace(field_, geometry_, bending_, batch);
   if (sides_) sides_->mark(batch);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const auto& [vertex, sample] = rays[i];

@@ -4,7 +4,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -106,11 +105,9 @@ class WavelengthTracer {
   const Plate plate_;
   const Beam& beam_;
   const BendingSettings& bending_;
-  std::shared_ptr<RayMemory> memory_;  // Null: rays are not remembered.
-  std::optional<Geometry> volume_;     // With `memory_`: the geometry without its plate.
-  std::optional<Body> body_;           // If it collects the light.
-  std::optional<SideFaces> sides_;     // If light that leaves through them does not count.
-  float tolerance_;                    // Of predicted landings, pixels.
+  std::optional<Body> body_;        // If it collects the light.
+  std::optional<SideFaces> sides_;  // If light that leaves through them does not count.
+  float tolerance_;                 // Of predicted landings, pixels.
   bool is_range_;
   std::vector<double> flexibilities_;  // One for each wavelength sample.
   std::atomic<std::uint64_t> rays_{0}, ray_steps_{0}, tensor_samples_{0};

@@ -178,14 +178,15 @@ TEST(Caustic, LightBesideAShadowMakesNoDots) {
 TEST(Caustic, TheEdgeOfAShadowIsExactBetweenVertices) {
   constexpr int samples = 33;
   const auto edge = [](double sample, double y) { return (sample + 0.5) / (samples - 1) + y / 4; };
-  for (const bool is_mirrored : {false, true}) {
+  for (const auto& [is_mirrored, dark] :
+       {std::pair(false, RayEnd::obstacle), std::pair(true, RayEnd::obstacle), std::pair(false, RayEnd::side)}) {
     FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(2 + 50 * at.x(), 2 + 60 * at.y()); });
     std::vector<Eigen::Vector2f> landings;
     map.ends.clear();
     for (std::size_t i = 0; i < map.starts.size(); ++i)
       for (int k = 0; k < samples; ++k) {
         const int sample = is_mirrored ? samples - 1 - k : k;
-        map.ends.push_back(map.starts[i].x() > edge(sample, map.starts[i].y()) ? RayEnd::plate : RayEnd::obstacle);
+        map.ends.push_back(map.starts[i].x() > edge(sample, map.starts[i].y()) ? RayEnd::plate : dark);
         landings.push_back(map.landings[i] + Eigen::Vector2f(0.2f * static_cast<float>(sample), 0));
       }
     map.landings = landings;
@@ -196,7 +197,7 @@ TEST(Caustic, TheEdgeOfAShadowIsExactBetweenVertices) {
       const CausticBand band{is_mirrored ? samples - 1 - sample : sample};
       const Caustic caustic = draw_caustic(map, unit_plate(), {band}, {}, Progress());
       EXPECT_NEAR(power_of(caustic, RayEnd::plate), 1 - edge(sample, 0.5), 1e-6) << sample;
-      EXPECT_NEAR(power_of(caustic, RayEnd::obstacle), edge(sample, 0.5), 1e-6) << sample;
+      EXPECT_NEAR(power_of(caustic, dark), edge(sample, 0.5), 1e-6) << sample;
       for (int row = 2; row < 62; ++row) {
         const double at = edge(sample, (row + 0.5 - 2) / 60), first = 2 + 50 * at + 0.2 * sample;
         const double* const light = &caustic.irradiance.values[static_cast<std::size_t>(row * pixels)];
