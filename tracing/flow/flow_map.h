@@ -33,6 +33,7 @@ struct FlowSettings {
 
   double tolerance = 0.5;  ///< Wanted error of landings between vertices, pixels; > 0.
   double finest = 0.5;     ///< Size of the smallest quads, pixels of straight light; the tolerance if it is less; > 0.
+                           ///< Light on a plate has twice as large ones away from edges and tears.
 
   bool silhouette = true;  ///< Whether the edge of the aperture is that of the volume, and the map is drawn as light.
                            ///< Rays from the edge start a little further inside, as they must enter the volume.

@@ -84,8 +84,8 @@ struct WrittenGrid {
   openvdb::Index64 value_bytes = 0;  ///< What these values would take in memory.
 };
 
-/// Writes grids in place, and adds their statistics to their metadata. Equal grids
-/// give equal bytes: the file's unique tag, which OpenVDB draws at random, is replaced by a hash of the contents.
+/// Writes grids in place, and adds their statistics to their metadata. Equal grids give equal bytes: the file's unique
+/// tag, which OpenVDB draws at random, is replaced by a hash of the contents.
 /// @throw std::runtime_error naming the file and the reason, also when the disk is full.
 void write_vdb(const std::filesystem::path& path, const std::vector<WrittenGrid>& grids,
                const openvdb::MetaMap& metadata, VdbCompression compression = VdbCompression::blosc);
