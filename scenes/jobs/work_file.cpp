@@ -24,7 +24,7 @@
 namespace tensorray {
 namespace {
 
-const std::string mark = "tensorray work 6\n";
+const std::string mark = "tensorray work 7\n";
 constexpr std::uintmax_t quickly_hashed = 1u << 24;
 constexpr const char* damaged = "is damaged; remove it and render it again";
 constexpr const char* cut_off = "is cut off; remove it and render it again";
