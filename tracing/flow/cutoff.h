@@ -1,6 +1,7 @@
 #pragma once
 /// Where, among the wavelength samples of a range, light of a vertex ceases to land, or begins to. Between vertices
-/// this place is linear: so the edge of a shadow is known within quads that are far larger than a pixel.
+/// this place is linear: so the edge of a shadow, or of light that leaves by a side face, is known within quads that
+/// are larger than a pixel.
 
 #include <array>
 #include <optional>

@@ -29,7 +29,7 @@ constexpr double most_around = 64;  // First quads along the beam, of light besi
 constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
                                 // its own way within a part of one.
 constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than this part of the tolerance is allowed.
-constexpr int spared_levels = 1;       // The last divisions, of quads where the edge of a shadow leaves the range.
+constexpr int spared_levels = 1;       // The last divisions, where an edge leaves the range, or is by a side face.
 constexpr float torn_deviation = 8;    // Pixels; a quad that has more may be torn.
 constexpr int max_levels = 14;
 constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
