@@ -340,8 +340,9 @@ class FlowMapBuilder {
       }
       is_seen = true;
     }
-    // Of light on a plate, the last division is for edges and tears alone: of rough light, it shows hardly more.
-    if (settings_.silhouette && quad.level + 1 == lattice().levels && quad.deviation <= torn_deviation) return false;
+    // Of light on a plate, the last division is for tears alone: of rough light, it shows hardly more.
+    const bool is_torn = quad.deviation > torn_deviation && std::isfinite(quad.deviation);
+    if (settings_.silhouette && quad.level + 1 == lattice().levels && !is_torn) return false;
     const float sweep = settings_.range ? (last - first).norm() : 0;
     return is_seen && quad.error > error_bound(quad, extent, width, sweep);
   }
