@@ -22,15 +22,13 @@
 namespace tensorray {
 namespace {
 
-constexpr double margin = 1.0 / 8;  // Extension of the plate on each side, in sizes of the plate.
-
-constexpr double most_around = 64;  // First quads along the beam, of light beside its core: it is straight.
-
-constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
-                                // its own way within a part of one.
+constexpr double margin = 1.0 / 8;     // Extension of the plate on each side, in sizes of the plate.
+constexpr double most_around = 64;     // First quads along the beam, of light beside its core: it is straight.
+constexpr int edge_levels = 2;         // Divisions of first quads at the edge before their error is estimated.
 constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than this part of the tolerance is allowed.
 constexpr int spared_levels = 1;       // The last divisions, where an edge leaves the range, or is by a side face.
 constexpr float torn_deviation = 8;    // Pixels; a quad that has more may be torn.
+constexpr float unknown = std::numeric_limits<float>::infinity();  // Deviation.
 constexpr int max_levels = 14;
 constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
 
@@ -133,8 +131,8 @@ class FlowVertices {
  private:
   static constexpr std::size_t task_size = 64;      // Vertices that one thread traces as one task.
   static constexpr std::size_t round_tasks = 4096;  // Whose landings ranks give each other at once (100 MB).
-  // Rays from the aperture's edge start this part of a patch further inside: at the edge, rounding decides whether they
-  // enter the volume.
+  // Rays from the aperture's edge start so far inside, in patches: there, rounding decides whether they enter the
+  // volume.
   static constexpr double inset = 3e-6;
 
   struct KeyHash {
@@ -341,10 +339,9 @@ class FlowMapBuilder {
       is_seen = true;
     }
     // Of light on a plate, the last division is for tears alone: of rough light, it shows hardly more.
-    const bool is_torn = quad.deviation > torn_deviation && std::isfinite(quad.deviation);
+    const bool is_torn = quad.deviation > torn_deviation && quad.deviation < unknown;
     if (settings_.silhouette && quad.level + 1 == lattice().levels && !is_torn) return false;
-    const float sweep = settings_.range ? (last - first).norm() : 0;
-    return is_seen && quad.error > error_bound(quad, extent, width, sweep);
+    return is_seen && quad.error > error_bound(quad, extent, width, settings_.range ? (last - first).norm() : 0);
   }
 
   /// The edge of a shadow between vertices. Maps that are not drawn as light have no use for it.
@@ -419,16 +416,20 @@ class FlowMapBuilder {
   }
 
   /// How far the landings of the middles are, at most, from what the corners beside them predict, at one wavelength
-  /// sample; infinite if some of the light does not land, unless the edge of its shadow is within the quad.
+  /// sample: of those that are known. Where some light does not land, and the edge of its shadow is not within the
+  /// quad, it is infinite, so that all of the quad is divided further; but not before the last division.
   float deviation_at(const Quad& quad, const Middles& middles, const ShadowEdge& edge, std::size_t sample) const {
-    constexpr float unknown = std::numeric_limits<float>::infinity();
+    const bool is_last = settings_.silhouette && quad.level + 2 >= lattice().levels;
     std::array<Eigen::Vector2f, 4> at;
+    at.fill(Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN()));
     for (std::size_t i = 0; i < 4; ++i) {
       const std::uint32_t corner = quad.corners[i];
-      const bool lands = map().landed(corner, sample);
-      if (!lands && !edge.is_within) return unknown;
-      at[i] = lands ? map().landing(corner, sample)
-                    : landing_beyond(map(), corner, static_cast<double>(sample), quad.corners.data(), 4).cast<float>();
+      if (map().landed(corner, sample))
+        at[i] = map().landing(corner, sample);
+      else if (edge.is_within)
+        at[i] = landing_beyond(map(), corner, static_cast<double>(sample), quad.corners.data(), 4).cast<float>();
+      else if (!is_last)
+        return unknown;
     }
     const auto [u, v] = middle_of(quad);
     const auto between = [](const Eigen::Vector2f& from, const Eigen::Vector2f& to, float part) {
@@ -437,14 +438,12 @@ class FlowMapBuilder {
     const Eigen::Vector2f bottom = between(at[0], at[1], u), top = between(at[3], at[2], u);
     const std::array<Eigen::Vector2f, 5> expected{bottom, between(at[1], at[2], v), top, between(at[0], at[3], v),
                                                   between(bottom, top, v)};
-    float greatest = 0;
-    for (int i = 0; i < 5; ++i) {
-      if (!map().landed(middles[i], sample)) {
-        if (!edge.is_within) return unknown;
-        continue;
-      }
-      greatest = std::max(greatest, (map().landing(middles[i], sample) - expected[i]).norm());
-    }
+    float greatest = -1;
+    for (int i = 0; i < 5; ++i)
+      if (map().landed(middles[i], sample))
+        greatest = std::max(greatest, (map().landing(middles[i], sample) - expected[i]).norm());  // Not if it is NaN.
+      else if (!edge.is_within && !is_last)
+        return unknown;
     return greatest;
   }
 
@@ -464,10 +463,10 @@ class FlowMapBuilder {
     const auto& [a, b, c, d] = quad.corners;
     const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
     const ShadowEdge edge = edge_of(all);
-    float greatest = 0;
+    float greatest = -1;
     for (std::size_t sample = 0; sample < map().wavelengths; sample += map().check_step)
       if (is_on_plate(reach_of(all, sample))) greatest = std::max(greatest, deviation_at(quad, middles, edge, sample));
-    return greatest;
+    return greatest < 0 ? unknown : greatest;
   }
 
   const Plate plate_;
