@@ -82,18 +82,10 @@ function(tensorray_common_headers name)
   endif()
 endfunction()
 
-# Compiles the sources of a target in groups, one for each folder ("room"), where headers and templates, which take most
-# of the time, are compiled once. Names in unnamed namespaces must then differ within a room. Call it where the target
-# was made, after its sources are known.
-function(tensorray_compile_by_room target)
-  get_target_property(sources ${target} SOURCES)
-  foreach(source ${sources})
-    get_filename_component(folder ${source} DIRECTORY)
-    file(RELATIVE_PATH room ${PROJECT_SOURCE_DIR} ${folder})
-    string(REPLACE / _ room "${room}")
-    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room})
-  endforeach()
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ${TENSORRAY_UNITY} UNITY_BUILD_MODE GROUP)
+# Compiles the sources of a target in groups of 16, where headers and templates, which take most of the time, are compiled
+# once. Names in unnamed namespaces must then differ within the target.
+function(tensorray_compile_together target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${TENSORRAY_UNITY} UNITY_BUILD_BATCH_SIZE 16)
 endfunction()
 
 # tensorray_library(NAME [EXCEPT PATTERN...]): a static library of all sources in this folder and its subfolders,
@@ -106,7 +98,7 @@ function(tensorray_library name)
     list(REMOVE_ITEM sources ${others})
   endif()
   add_library(${name} STATIC ${sources})
-  tensorray_compile_by_room(${name})
+  tensorray_compile_together(${name})
   tensorray_relocatable(${name})
   target_link_libraries(${name} PUBLIC Eigen3::Eigen PRIVATE tensorray_options)
   tensorray_common_headers(${name})

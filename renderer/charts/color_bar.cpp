@@ -18,7 +18,7 @@ namespace {
 using Box = Eigen::AlignedBox2d;  // In pixels from the upper left corner, continuous.
 
 /// Tolerance at the ends of the range, as a fraction of a step: a tick this close outside is still in the range.
-constexpr double rounding = 1e-9;
+constexpr double bar_rounding = 1e-9;
 
 std::string fixed(double value, int decimals) {
   std::array<char, 400> text;
@@ -26,7 +26,7 @@ std::string fixed(double value, int decimals) {
   return {text.begin(), end.ptr};
 }
 
-int decade_of(double value) { return static_cast<int>(std::floor(std::log10(std::abs(value)) + rounding)); }
+int decade_of(double value) { return static_cast<int>(std::floor(std::log10(std::abs(value)) + bar_rounding)); }
 
 /// @param largest  Decade of the largest number of the scale. @param last  Decade of the last digit to be written.
 std::string label_of(double value, int largest, int last) {
@@ -37,7 +37,7 @@ std::string label_of(double value, int largest, int last) {
 
 /// The smallest step of the form 1, 2 or 5 times a power of ten that divides `size` into at most `most` steps.
 double round_step(double size, int most) {
-  const double raw = size / most * (1 - rounding), decade = std::pow(10.0, std::floor(std::log10(raw)));
+  const double raw = size / most * (1 - bar_rounding), decade = std::pow(10.0, std::floor(std::log10(raw)));
   for (const double factor : {1.0, 2.0, 5.0})
     if (factor * decade >= raw) return factor * decade;
   return 10 * decade;
@@ -45,7 +45,7 @@ double round_step(double size, int most) {
 
 std::vector<Tick> linear_ticks(const ValueRange& range, int most) {
   const double step = round_step(range.high - range.low, most - 1);
-  const double first = std::ceil(range.low / step - rounding), last = std::floor(range.high / step + rounding);
+  const double first = std::ceil(range.low / step - bar_rounding), last = std::floor(range.high / step + bar_rounding);
   const int largest = decade_of(std::max(std::abs(first), std::abs(last)) * step);
   std::vector<Tick> ticks;
   for (double i = first; i <= last; ++i) ticks.push_back({i * step, label_of(i * step, largest, decade_of(step))});
@@ -58,7 +58,8 @@ std::vector<Tick> decades(const ValueRange& range, const std::vector<double>& fa
   for (int decade = decade_of(range.low); decade <= decade_of(range.high); ++decade)
     for (const double factor : factors) {
       const double value = factor * std::pow(10.0, decade);
-      if (decade % stride != 0 || value < range.low * (1 - rounding) || value > range.high * (1 + rounding)) continue;
+      if (decade % stride != 0 || value < range.low * (1 - bar_rounding) || value > range.high * (1 + bar_rounding))
+        continue;
       ticks.push_back({value, label_of(value, decade, decade)});
     }
   return ticks;
@@ -142,7 +143,7 @@ void check(const ValueRange& range) {
 }
 
 template <class Items>
-double widest(const Items& items, double height) {
+double widest_text(const Items& items, double height) {
   double width = 0;
   for (const auto& item : items) width = std::max(width, text_width(item.label, height));
   return width;
@@ -175,7 +176,7 @@ void draw_color_bar(Image& image, const ColorBar& bar, const LegendPlace& place)
   const std::vector<Tick> ticks = round_ticks(bar.range, std::clamp(static_cast<int>(height / layout.row()), 2, 7));
   const double mark = std::round(0.4 * layout.letter), labels = layout.swatch() + 2 * layout.line + mark + layout.gap();
   const Panel panel =
-      lay_panel(image, layout, {labels + widest(ticks, layout.letter), height + 2 * end}, bar.title, place);
+      lay_panel(image, layout, {labels + widest_text(ticks, layout.letter), height + 2 * end}, bar.title, place);
 
   const Eigen::Vector2d corner = panel.inside.min() + Eigen::Vector2d(layout.line, std::round(end));
   const Box box(corner, Eigen::Vector2d(corner + Eigen::Vector2d(layout.swatch(), height)));
@@ -198,7 +199,8 @@ void draw_color_key(Image& image, const ColorKey& key, const LegendPlace& place)
   const double row = std::round(2.1 * layout.letter);
   const double label = layout.swatch() + 2 * layout.line + layout.gap();
   const double rows = row * static_cast<double>(key.entries.size() - 1) + layout.swatch() + 2 * layout.line;
-  const Panel panel = lay_panel(image, layout, {label + widest(key.entries, layout.letter), rows}, key.title, place);
+  const Panel panel =
+      lay_panel(image, layout, {label + widest_text(key.entries, layout.letter), rows}, key.title, place);
   Eigen::Vector2d corner = panel.inside.min() + Eigen::Vector2d::Constant(layout.line);
   for (const ColorKeyEntry& entry : key.entries) {
     const Box square(corner, Eigen::Vector2d(corner + Eigen::Vector2d::Constant(layout.swatch())));

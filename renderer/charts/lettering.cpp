@@ -32,7 +32,7 @@ constexpr std::array<Outline, 96> outlines{{
 }};
 // clang-format on
 
-struct Segment {
+struct Stroke {
   Eigen::Vector2d from, to;
 };
 
@@ -43,7 +43,7 @@ struct Arc {
 
 struct Glyph {
   double width = 0;
-  std::vector<Segment> segments;
+  std::vector<Stroke> segments;
   std::vector<Arc> arcs;  ///< Both ends of each arc are ends of segments.
 };
 
@@ -53,7 +53,7 @@ struct Corner {
 };
 
 /// Adds the arc of a corner. Returns the points where it touches the lines to the points before and after.
-Segment round_corner(const Eigen::Vector2d& before, const Corner& corner, const Eigen::Vector2d& after, Glyph& glyph) {
+Stroke round_corner(const Eigen::Vector2d& before, const Corner& corner, const Eigen::Vector2d& after, Glyph& glyph) {
   const Eigen::Vector2d a = (before - corner.point).normalized(), b = (after - corner.point).normalized();
   const Eigen::Vector2d inwards = (a + b).normalized();
   const double cosine = inwards.dot(a), sine = std::sqrt(1 - cosine * cosine);  // Of half the angle at the corner.
@@ -65,7 +65,7 @@ Segment round_corner(const Eigen::Vector2d& before, const Corner& corner, const 
 void add_polyline(const std::vector<Corner>& corners, Glyph& glyph) {
   Eigen::Vector2d from = corners.front().point;
   for (std::size_t i = 1; i < corners.size(); ++i) {
-    Segment corner{corners[i].point, corners[i].point};
+    Stroke corner{corners[i].point, corners[i].point};
     if (corners[i].radius > 0) corner = round_corner(corners[i - 1].point, corners[i], corners[i + 1].point, glyph);
     glyph.segments.push_back({from, corner.from});
     from = corner.to;
@@ -112,7 +112,7 @@ std::string drawable(const std::string& text) {
   return result;
 }
 
-double distance(const Segment& segment, const Eigen::Vector2d& point) {
+double distance(const Stroke& segment, const Eigen::Vector2d& point) {
   const Eigen::Vector2d along = segment.to - segment.from;
   const double length = along.squaredNorm();
   const double t = length > 0 ? std::clamp((point - segment.from).dot(along) / length, 0.0, 1.0) : 0.0;
@@ -122,7 +122,7 @@ double distance(const Segment& segment, const Eigen::Vector2d& point) {
 /// Distance from a point to the middle of the nearest stroke, in units of the grid.
 double distance(const Glyph& glyph, const Eigen::Vector2d& point) {
   double nearest = INFINITY;
-  for (const Segment& segment : glyph.segments) nearest = std::min(nearest, distance(segment, point));
+  for (const Stroke& segment : glyph.segments) nearest = std::min(nearest, distance(segment, point));
   for (const Arc& arc : glyph.arcs) {
     const Eigen::Vector2d offset = point - arc.center;
     const double length = offset.norm();

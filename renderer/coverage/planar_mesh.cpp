@@ -28,12 +28,12 @@ double size(const Eigen::AlignedBox2d& box) {
 
 /// A few roundings of the largest coordinate: points that callers compute on an edge are off it by this much. It is
 /// more than the errors of `weights` below, so a point near a shared edge is in one of both.
-double rounding(const Eigen::AlignedBox2d& box) {
+double rounding_within(const Eigen::AlignedBox2d& box) {
   if (box.isEmpty()) return 0;
   return 16 * epsilon * box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
 }
 
-double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+double planar_cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 /// The barycentric weights of a point that is in the triangle, or outside it by no more than the tolerance.
 std::optional<Eigen::Vector3d> weights(const Vector2d& point, const std::array<Vector2d, 3>& corners,
@@ -43,13 +43,14 @@ std::optional<Eigen::Vector3d> weights(const Vector2d& point, const std::array<V
   const Vector2d high = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
   if ((point.array() < low.array() - tolerance).any() || (point.array() > high.array() + tolerance).any()) return {};
 
-  const double area = cross(corners[1] - corners[0], corners[2] - corners[0]);  // Twice the signed area.
+  const double area = planar_cross(corners[1] - corners[0], corners[2] - corners[0]);  // Twice the signed area.
   if (std::abs(area) <= 4 * epsilon * (high - low).squaredNorm()) return {};
   Eigen::Vector3d result;
   for (int i = 0; i < 3; ++i) {
     const Vector2d& start = corners[(i + 1) % 3];
     const Vector2d edge = corners[(i + 2) % 3] - start;
-    const double inside = cross(edge, point - start) * (area < 0 ? -1 : 1);  // Distance to the edge, times its length.
+    const double inside =
+        planar_cross(edge, point - start) * (area < 0 ? -1 : 1);  // Distance to the edge, times its length.
     if (!(inside >= -tolerance * edge.norm())) return {};
     result[i] = std::max(inside, 0.0);
   }
@@ -62,7 +63,7 @@ PlanarMeshSearch::PlanarMeshSearch(const PlanarMesh& mesh)
     : mesh_(&mesh),
       box_(triangles_box(mesh)),
       size_(size(box_)),
-      tolerance_(rounding(box_)),
+      tolerance_(rounding_within(box_)),
       scene_(mesh.vertices, mesh.triangles, center(box_), size_) {}
 
 /// Embree proposes triangles; double precision decides. A ray through the mesh would miss thin triangles, and edges

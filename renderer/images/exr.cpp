@@ -69,7 +69,7 @@ std::vector<std::string> distinct_names(const std::vector<std::string>& channels
 }
 
 /// @param numbers  x and y of red, green, blue and white.
-Imf::Chromaticities chromaticities_of(const std::string& numbers) {
+Imf::Chromaticities exr_chromaticities(const std::string& numbers) {
   std::istringstream words(numbers);
   Imath::V2f points[4];
   for (Imath::V2f& point : points) words >> point.x >> point.y;
@@ -83,7 +83,7 @@ Imf::Header header_of(const Image& image, const ImageMetadata& metadata) {
   header.insert("capDate", Imf::StringAttribute());  // Unknown: the same picture gives the same bytes at any time.
   const std::set<std::string> left_out{"", "type", "oiio:ColorSpace", "ICCProfile"};
   if (metadata.count("chromaticities") > 0)
-    header.insert("chromaticities", Imf::ChromaticitiesAttribute(chromaticities_of(metadata.at("chromaticities"))));
+    header.insert("chromaticities", Imf::ChromaticitiesAttribute(exr_chromaticities(metadata.at("chromaticities"))));
   for (const auto& [attribute, text] : metadata) {
     const std::string name = attribute_name(attribute);
     const bool is_free = left_out.count(name) == 0 && header.find(name) == header.end();

@@ -92,7 +92,7 @@ std::vector<Knot> knots_of(const Tube& tube) {
 /// A point between two points of a tube. The centre is on the cubic that has the tube's direction at both points, with
 /// such a speed there that a circle's arc keeps its height. The ellipse turns with the direction; its x and y are on
 /// the cubics with the slopes of both points.
-TubePoint between(const Knot& start, const Knot& end, double t) {
+TubePoint point_between(const Knot& start, const Knot& end, double t) {
   const TubePoint &a = start.point, &b = end.point;
   const Eigen::Vector3d from = axis(a), to = axis(b), chord = b.center - a.center;
   const double half_turn = std::sqrt(std::max(0.0, (1 + from.dot(to)) / 2));  // Its cosine.
@@ -160,7 +160,7 @@ Tube adapted(const Tube& tube, double tolerance, double value_tolerance, double 
     const double wanted = std::ceil(std::sqrt(deviation(knots[i - 1], knots[i]) / (tolerance / 2)));
     const int pieces = static_cast<int>(std::clamp(wanted, 1.0, double(max_pieces)));
     for (int piece = 1; piece < pieces; ++piece)
-      result.push_back(between(knots[i - 1], knots[i], double(piece) / pieces));
+      result.push_back(point_between(knots[i - 1], knots[i], double(piece) / pieces));
     result.push_back(kept[i]);
   }
   return result;
@@ -180,7 +180,7 @@ Tube spaced(const Tube& tube, double spacing) {
     while (next + 1 < tube.size() && lengths[next] < at) ++next;
     const double gap = lengths[next] - lengths[next - 1];
     const double t = gap > 0 ? std::clamp((at - lengths[next - 1]) / gap, 0.0, 1.0) : 1;
-    result.push_back(between(knots[next - 1], knots[next], t));
+    result.push_back(point_between(knots[next - 1], knots[next], t));
   }
   return result;
 }

@@ -63,19 +63,19 @@ Interpolant used_interpolant(Interpolant interpolant, bool has_surface) {
 }
 
 /// The blocks of a level.
-struct LevelBlocks {
+struct BlocksOfLevel {
   const std::vector<BlockShape>& shapes;
   const std::function<void(std::size_t i, TensorBlock& block)>& fill;
 };
 
-LevelBlocks blocks_of(const BlockSource& source, std::size_t level) {
+BlocksOfLevel blocks_of(const BlockSource& source, std::size_t level) {
   if (level == 0) return {source.shapes, source.fill};
   return {source.finer[level - 1].shapes, source.finer[level - 1].fill};
 }
 
 /// What the bricks of a level are made of.
 struct LevelPlan {
-  LevelBlocks blocks;
+  BlocksOfLevel blocks;
   BlockTable table;
   Eigen::AlignedBox3i extent;
 };
@@ -121,7 +121,7 @@ void check_levels(const BlockSource& source, const Eigen::AlignedBox3i& voxels, 
 std::vector<LevelPlan> plans_of(const BlockSource& source, const Eigen::AlignedBox3i& voxels) {
   std::vector<LevelPlan> plans;
   for (std::size_t level = 0; level <= source.finer.size(); ++level) {
-    const LevelBlocks blocks = blocks_of(source, level);
+    const BlocksOfLevel blocks = blocks_of(source, level);
     if (blocks.shapes.empty()) break;
     plans.push_back({blocks, BlockTable(blocks.shapes), level == 0 ? voxels : finer_extent(plans.back().extent)});
   }

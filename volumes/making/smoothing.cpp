@@ -18,21 +18,21 @@ namespace {
 
 using Eigen::AlignedBox3i;
 using Eigen::Vector3i;
-using Weights = std::vector<double>;
+using GaussianWeights = std::vector<double>;
 using BlockNumbers = std::vector<std::size_t>;
 
 constexpr double cut = 4;  // Deviations at which the Gaussian ends.
 constexpr double least_smoothing = 1 / cut;
 
 /// The Gaussian at −radius … radius.
-Weights gaussian(double deviation) {
+GaussianWeights gaussian(double deviation) {
   const int radius = static_cast<int>(cut * deviation);
-  Weights weights;
+  GaussianWeights weights;
   for (int i = -radius; i <= radius; ++i) weights.push_back(std::exp(-0.5 * (i / deviation) * (i / deviation)));
   return weights;
 }
 
-int radius_of(const Weights& weights) { return static_cast<int>(weights.size() / 2); }
+int radius_of(const GaussianWeights& weights) { return static_cast<int>(weights.size() / 2); }
 
 Vector3i place_in(const Vector3i& voxel, int edge) {
   return voxel.unaryExpr([edge](int i) { return (i - (i % edge + edge) % edge) / edge; });
@@ -68,7 +68,7 @@ struct Numbers {
 };
 
 /// Weighted sums along an axis, at the voxels that `box` has along it.
-Numbers sums_along(int axis, const Numbers& from, const Weights& weights, const AlignedBox3i& box) {
+Numbers sums_along(int axis, const Numbers& from, const GaussianWeights& weights, const AlignedBox3i& box) {
   AlignedBox3i part = from.box;
   part.min()[axis] = box.min()[axis];
   part.max()[axis] = box.max()[axis];
@@ -94,7 +94,7 @@ struct TileSmoothing {
   const std::vector<BlockShape>& shapes;
   const BrickIndex& index;
   const AlignedBox3i& extent;
-  const Weights& weights;
+  const GaussianWeights& weights;
 
   void smooth(const BlockNumbers& tile, TensorBlocks& results) const {
     AlignedBox3i box;
@@ -140,7 +140,7 @@ struct TileSmoothing {
 };
 
 /// The blocks of a grid of one level, smoothed.
-TensorBlocks smoothed_blocks(const TensorGrid& grid, const Weights& weights) {
+TensorBlocks smoothed_blocks(const TensorGrid& grid, const GaussianWeights& weights) {
   const std::vector<BlockShape> shapes = grid.shapes();
   const AlignedBox3i extent = active_box(shapes);
   std::vector<Vector3i> places;
@@ -156,7 +156,7 @@ TensorBlocks smoothed_blocks(const TensorGrid& grid, const Weights& weights) {
 
 /// Smooths a finer level, of a grid whose coarser ones are not smoothed yet.
 void smooth_level(TensorGrid& grid, int level, double deviation) {
-  const Weights weights = gaussian(deviation);
+  const GaussianWeights weights = gaussian(deviation);
   const TensorBlocks results = smoothed_blocks(level_grid(grid, level, radius_of(weights)), weights);
   auto result = results.begin();  // Both have the same order, and the level has a part of the results.
   for (TensorBlock& block : grid.finer[static_cast<std::size_t>(level) - 1]) {
