@@ -4,6 +4,7 @@
 #include <functional>
 #include <utility>
 
+#include <vtkCellData.h>
 #include <vtkCellType.h>
 #include <vtkDataSet.h>
 #include <vtkDoubleArray.h>
@@ -37,6 +38,8 @@ inline vtkSmartPointer<vtkStructuredGrid> curvilinear(const Vector3i& nodes, con
   grid->SetPoints(points);
   return grid;
 }
+
+inline Vector3d unchanged(const Vector3d& p) { return p; }
 
 /// Bends the unit cube: moves its inner nodes, and keeps its faces in place.
 inline Vector3d bent(const Vector3d& p) {
@@ -105,6 +108,17 @@ void add_array(vtkDataSet& mesh, const std::string& name,
     array->SetTuple(i, value(position).eval().data());
   }
   mesh.GetPointData()->AddArray(array);
+}
+
+/// Adds a cell array with the values that `value` returns for the numbers of the cells.
+template <int components, class Value>
+void add_cell_array(vtkDataSet& mesh, const std::string& name, const Value& value) {
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name.c_str());
+  array->SetNumberOfComponents(components);
+  for (vtkIdType i = 0; i < mesh.GetNumberOfCells(); ++i)
+    array->InsertNextTuple(Eigen::Matrix<double, components, 1>(value(i)).data());
+  mesh.GetCellData()->AddArray(array);
 }
 
 /// A tensor with nine different linear functions as components.
