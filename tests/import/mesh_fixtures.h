@@ -16,8 +16,7 @@
 #include <vtkUnstructuredGrid.h>
 
 #include "base/constants.h"
-#include "tests/names.h"
-#include "volumes/grids/tensor_grid.h"
+#include "tests/volumes/grid_support.h"
 
 namespace tensorray::mesh_fixtures {
 
@@ -137,11 +136,9 @@ inline Eigen::Matrix<double, 9, 1> flat(const Matrix3d& tensor) {
 }
 
 inline void for_each_voxel(const TensorGrid& grid, const std::function<void(const Vector3d&, const Matrix3d&)>& visit) {
-  for (const TensorBlock& block : grid.blocks)
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-      if (block.active[static_cast<std::size_t>(offset)])
-        visit(grid.to_world * (block.origin + TensorBlock::position(offset)).cast<double>(),
-              block.values[static_cast<std::size_t>(offset)].cast<double>());
+  for_each_active(grid, [&](const Vector3i& index, const Matrix3f& tensor) {
+    visit(grid.to_world * index.cast<double>(), tensor.cast<double>());
+  });
 }
 
 }  // namespace tensorray::mesh_fixtures

@@ -28,6 +28,14 @@ typename Grid::Ptr stock_grid(const std::string& name) {
   return grid;
 }
 
+/// An empty grid of a type that OpenVDB makes by its name, so that it is not compiled here.
+inline openvdb::GridBase::Ptr stock_grid_of_type(const std::string& type, const std::string& name) {
+  openvdb::initialize();
+  const auto grid = openvdb::GridBase::createGrid("Tree_" + type + "_5_4_3");
+  grid->setName(name);
+  return grid;
+}
+
 /// The rows of a tensor: `set(grid, row)` sets their voxels.
 template <class Set>
 openvdb::GridPtrVec stock_rows(const std::string& name, const Set& set) {
@@ -43,6 +51,21 @@ openvdb::GridPtrVec stock_rows(const std::string& name, const Set& set) {
 /// Rows with one voxel, at the origin.
 inline openvdb::GridPtrVec voxel_rows(const std::string& name, float value = 1) {
   return stock_rows(name, [&](auto& grid, int) { grid.tree().setValue({0, 0, 0}, openvdb::Vec3s(value)); });
+}
+
+/// All grids of a file, as OpenVDB itself reads them.
+inline openvdb::GridPtrVec stock_grids(const std::filesystem::path& path) {
+  openvdb::initialize();
+  openvdb::io::File file(path.string());
+  file.open(/*delayLoad=*/false);
+  return *file.getGrids();
+}
+
+template <class Grid>
+typename Grid::Ptr stock_grid_of(const std::filesystem::path& path, const std::string& name) {
+  for (const auto& grid : stock_grids(path))
+    if (grid->getName() == name) return openvdb::gridPtrCast<Grid>(grid);
+  return nullptr;
 }
 
 inline void write_stock(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,

@@ -35,15 +35,11 @@ TensorGrid sampled(vtkDataSet& mesh, const SamplingSettings& settings) {
   return sampled(mesh, settings, report);
 }
 
-SamplingSettings resolution(int count) {
+/// Of a number of voxels along the longest edge or along each, or of their size.
+template <class Resolution>
+SamplingSettings resolution(const Resolution& value) {
   SamplingSettings settings;
-  settings.resolution = count;
-  return settings;
-}
-
-SamplingSettings voxels_of_edge(double edge) {
-  SamplingSettings settings;
-  settings.resolution = edge;
+  settings.resolution = value;
   return settings;
 }
 
@@ -76,13 +72,7 @@ void expect_same_on_threads(vtkDataSet& mesh, const SamplingSettings& settings) 
   for (const std::size_t threads : {1u, 2u, 3u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     grids.push_back(sampled(mesh, settings));
-    const TensorBlocks &one = grids.front().blocks, &other = grids.back().blocks;
-    ASSERT_EQ(one.size(), other.size());
-    for (std::size_t k = 0; k < one.size(); ++k) {
-      EXPECT_EQ(one[k].origin, other[k].origin);
-      EXPECT_EQ(one[k].active, other[k].active);
-      EXPECT_TRUE(one[k].values == other[k].values);
-    }
+    expect_same_blocks(grids.back(), grids.front());
   }
 }
 
@@ -123,9 +113,7 @@ TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
   EXPECT_TRUE(longest.to_world.translation().isApprox(Vector3d(1, 0, 0)));
   expect_linear(longest);
 
-  SamplingSettings settings;
-  settings.resolution = Vector3i(5, 6, 7);
-  expect_linear(sampled(*mesh, settings, report));
+  expect_linear(sampled(*mesh, resolution(Vector3i(5, 6, 7)), report));
   EXPECT_EQ(report.size, Vector3i(5, 6, 7));
   EXPECT_TRUE(report.voxel.isApprox(Vector3d(0.5, 0.2, 0.5 / 6)));
   EXPECT_EQ(report.active, 5u * 6u * 7u);
@@ -133,8 +121,7 @@ TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
   // A voxel of another size than the body's parts becomes smaller: the field has the faces, and no more.
   for (const auto& [voxel, size] :
        {std::pair(0.3, Vector3i(8, 5, 3)), {0.667, Vector3i(4, 3, 2)}, {2.0, Vector3i(2, 2, 2)}}) {
-    settings.resolution = voxel;
-    const TensorGrid grid = sampled(*mesh, settings, report);
+    const TensorGrid grid = sampled(*mesh, resolution(voxel), report);
     EXPECT_EQ(report.size, size);
     EXPECT_EQ(report.active, static_cast<std::size_t>(size.prod()));
     EXPECT_LE(report.voxel.maxCoeff(), 1.01 * voxel);
@@ -217,9 +204,8 @@ TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {
 TEST(MeshSampling, BoundsCropTheLatticeAndTheReport) {
   const auto mesh = unit_cube(VTK_HEXAHEDRON, 4, unchanged);
   add_linear_tensor(*mesh);
-  SamplingSettings settings;
+  SamplingSettings settings = resolution(0.125);
   settings.bounds = Eigen::AlignedBox3d(Vector3d(0.25, 0.25, 0), Vector3d(0.5, 0.5, 2));
-  settings.resolution = 0.125;
   SamplingReport report;
   const TensorGrid grid = sampled(*mesh, settings, report);
   EXPECT_EQ(report.size, Vector3i(3, 3, 17));
@@ -312,16 +298,11 @@ TEST(MeshSampling, RefusesWhatCannotBeSampled) {
   };
   refuses(resolution(1), "--resolution");
   refuses(resolution(1025), "2^30");
+  refuses(resolution(Vector3i(4, 0, 4)), "--resolution");
+  for (const double voxel : {0.0, -1.0, 3.0, std::numeric_limits<double>::quiet_NaN()})
+    refuses(resolution(voxel), "--voxel-size");
+  refuses(resolution(1e-300), "2^30");
   SamplingSettings settings;
-  settings.resolution = Vector3i(4, 0, 4);
-  refuses(settings, "--resolution");
-  for (const double voxel : {0.0, -1.0, 3.0, std::numeric_limits<double>::quiet_NaN()}) {
-    settings.resolution = voxel;
-    refuses(settings, "--voxel-size");
-  }
-  settings.resolution = 1e-300;
-  refuses(settings, "2^30");
-  settings = {};
   settings.bounds = Eigen::AlignedBox3d(Vector3d(2, 2, 2), Vector3d(3, 3, 3));
   refuses(settings, "nothing of the mesh is inside, which goes from (0, 0, 0) to (1, 1, 1)");
   settings.bounds = Eigen::AlignedBox3d(Vector3d(0, 0, 0), Vector3d(1, 0, 1));
@@ -360,7 +341,7 @@ TEST(VoxelAverages, OfABoundaryLayerHaveLessErrorThanTheirCentres) {
   for (const double most : {0.11, 0.09, 0.07, 0.047}) {
     const double voxel = 1 / std::ceil(1 / most);  // Voxels are on both faces of the cube.
     double of_averages = 0, of_centres = 0;
-    for_each_voxel(sampled(*mesh, voxels_of_edge(voxel)), [&](const Vector3d& p, const Matrix3d& tensor) {
+    for_each_voxel(sampled(*mesh, resolution(voxel)), [&](const Vector3d& p, const Matrix3d& tensor) {
       if (p.z() < voxel / 2 || p.z() > 0.5) return;  // Voxels that the mesh fills.
       const double truth = layer_average(p.z() - voxel / 2, p.z() + voxel / 2);
       of_averages += std::pow(tensor(0, 0) - truth, 2);
@@ -375,7 +356,7 @@ TEST(VoxelAverages, OfALinearFieldAreItsValuesAtTheCentresAlsoAtWalls) {
     const auto mesh = unit_cube(type, 12, bent);
     add_linear_tensor(*mesh);
     SamplingReport report;
-    EXPECT_LT(worst_error(sampled(*mesh, voxels_of_edge(0.25), report), linear_tensor), 5e-5) << type;
+    EXPECT_LT(worst_error(sampled(*mesh, resolution(0.25), report), linear_tensor), 5e-5) << type;
     EXPECT_EQ(report.active, 125u) << type;
   }
 }
@@ -384,7 +365,7 @@ TEST(VoxelAverages, WhereCellsAreAsLargeAsVoxelsCentresCount) {
   const auto mesh = unit_cube(VTK_HEXAHEDRON, 4, unchanged);
   const auto value = [](const Vector3d& p) { return std::sin(9 * p.x()); };
   add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) { return flat(value(p) * Matrix3d::Identity()); });
-  for_each_voxel(sampled(*mesh, voxels_of_edge(0.25)), [&](const Vector3d& p, const Matrix3d& tensor) {
+  for_each_voxel(sampled(*mesh, resolution(0.25)), [&](const Vector3d& p, const Matrix3d& tensor) {
     EXPECT_EQ(static_cast<float>(tensor(0, 0)), static_cast<float>(value(p)));
   });
 }
@@ -392,7 +373,7 @@ TEST(VoxelAverages, WhereCellsAreAsLargeAsVoxelsCentresCount) {
 TEST(VoxelAverages, AreTheSameBitsOnAnyNumberOfThreads) {
   const auto mesh = graded_mesh(bent);
   add_layer(*mesh, [](const Vector3d& p) { return p.z(); });
-  expect_same_on_threads(*mesh, voxels_of_edge(0.12));
+  expect_same_on_threads(*mesh, resolution(0.12));
 }
 
 /// Twelve cubes in a row; a cell array `T` is 1 in all of them but one, which has `lone`.
@@ -405,39 +386,30 @@ vtkSmartPointer<vtkStructuredGrid> row_with_lone_cell(double lone) {
 TEST(CellValues, LossIsMeasuredOnTheFilesOwnValues) {
   const auto mesh = row_with_lone_cell(8);
   SamplingReport report;
-  sampled(*with_tensors(*mesh, {"T", true}, Take::tensor, {}), voxels_of_edge(0.5), report);
+  sampled(*with_tensors(*mesh, {"T", true}, Take::tensor, {}), resolution(0.5), report);
   EXPECT_TRUE(report.of_cells);
   EXPECT_NEAR(report.native_peak, 8 * std::sqrt(3.0), 1e-12);
   EXPECT_NEAR(report.native_median, std::sqrt(3.0), 1e-12);
   EXPECT_NEAR(report.sampled_peak, 4.5 * std::sqrt(3.0), 1e-5);  // Points have the mean of their cells.
 }
 
-TEST(CellValues, ConstantGivesEachVoxelItsCell) {
+TEST(CellValues, ConstantGivesEachVoxelItsCellOrTheAverageOfThinnerOnes) {
   const auto mesh = row_with_lone_cell(8);
+  const auto tensors = with_tensors(*mesh, {"T", true}, Take::tensor, {}, CellValues::constant);
   SamplingReport report;
-  const TensorGrid grid =
-      sampled(*with_tensors(*mesh, {"T", true}, Take::tensor, {}, CellValues::constant), voxels_of_edge(0.4), report);
-  EXPECT_NEAR(report.sampled_peak, 8 * std::sqrt(3.0), 1e-5);
-  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+  for_each_voxel(sampled(*tensors, resolution(0.4), report), [&](const Vector3d& p, const Matrix3d& tensor) {
     if (std::abs(p.x() - std::round(p.x())) > 1e-3) {  // On a face, the first cell counts.
       EXPECT_EQ(tensor(1, 1), p.x() > 5 && p.x() < 6 ? 8 : 1) << p;
     }
   });
-  EXPECT_THROW(with_tensors(*mesh, {"T", true}, Take::gradient, {}, CellValues::constant), std::invalid_argument);
-}
-
-TEST(CellValues, ConstantInCellsThinnerThanVoxelsAreAveraged) {
-  const auto mesh = row_with_lone_cell(8);
-  const auto tensors = with_tensors(*mesh, {"T", true}, Take::tensor, {}, CellValues::constant);
-  SamplingSettings settings;
-  settings.resolution = Vector3i(3, 2, 2);  // Voxels of 6 x 1 x 1, centred at 0, 6 and 12.
-  SamplingReport report;
-  const TensorGrid grid = sampled(*tensors, settings, report);
-  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+  EXPECT_NEAR(report.sampled_peak, 8 * std::sqrt(3.0), 1e-5);
+  // Voxels of 6 x 1 x 1, centred at 0, 6 and 12.
+  for_each_voxel(sampled(*tensors, resolution(Vector3i(3, 2, 2))), [&](const Vector3d& p, const Matrix3d& tensor) {
     if (std::abs(p.x() - 6) < 1e-6) {
       EXPECT_NEAR(tensor(0, 0), (8 + 5) / 6.0, 1e-3);
     }
   });
+  EXPECT_THROW(with_tensors(*mesh, {"T", true}, Take::gradient, {}, CellValues::constant), std::invalid_argument);
 }
 
 // Every three-dimensional type of cell that VTK has is sampled, and divided into parts.

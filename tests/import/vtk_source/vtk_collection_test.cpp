@@ -73,19 +73,17 @@ TEST(VtkCollection, APartThatIsNamedTwiceForOneTimeCountsOnceOrIsRefused) {
   other->GetPointData()->GetArray("tensor")->Fill(7);
   write_xml(*other, folder / "restarted.vtu");
   const std::string a = "<DataSet timestep=\"1\" part=\"0\" file=\"a.vtu\"/>\n";
-  write_bytes(folder / "same.pvd", series(a + a));
-  expect_same(*read_vtk_source(folder / "same.pvd"), *bar(0, 3), 0x1p-1000);
-  write_bytes(folder / "same.pvd", series(a + "<DataSet timestep=\"1\" part=\"0\" file=\"./a.vtu\"/>\n"));
-  expect_same(*read_vtk_source(folder / "same.pvd"), *bar(0, 3), 0x1p-1000);
+  for (const std::string& again : {a, replaced_text(a, "a.vtu", "./a.vtu")}) {
+    write_bytes(folder / "same.pvd", series(a + again));
+    expect_same(*read_vtk_source(folder / "same.pvd"), *bar(0, 3), 0x1p-1000);
+  }
   for (const char* part : {"part=\"0\" ", ""}) {
     write_bytes(folder / "both.pvd", series(a + "<DataSet timestep=\"1\" " + part + "file=\"restarted.vtu\"/>\n"));
-    const std::string error = read_error(folder / "both.pvd");
-    EXPECT_NE(error.find("both.pvd: names the same mesh twice for one time, as a.vtu and as restarted.vtu"),
-              std::string::npos)
-        << error;
+    EXPECT_THAT(read_error(folder / "both.pvd"),
+                HasSubstr("both.pvd: names the same mesh twice for one time, as a.vtu and as restarted.vtu"));
   }
   write_bytes(folder / "both.vtm", blocks_of({"a.vtu", "restarted.vtu"}));
-  EXPECT_NE(read_error(folder / "both.vtm").find("names the same mesh twice"), std::string::npos);
+  EXPECT_THAT(read_error(folder / "both.vtm"), HasSubstr("names the same mesh twice"));
 }
 
 TEST(VtkCollection, OfASeriesOfFilesEachIsAStep) {
@@ -107,8 +105,7 @@ TEST(VtkCollection, OfASeriesOfFilesEachIsAStep) {
                                     {file_series("{\"name\": \"a.vtu.series\"}"), "names the collection"},
                                     {std::string("[1, 2"), "is not a series of files"}}) {
     write_bytes(folder / "a.vtu.series", text);
-    EXPECT_NE(read_error(folder / "a.vtu.series").find(error), std::string::npos)
-        << read_error(folder / "a.vtu.series");
+    EXPECT_THAT(read_error(folder / "a.vtu.series"), HasSubstr(error));
   }
 }
 
@@ -117,9 +114,7 @@ TEST(VtkCollection, ErrorsNameTheFile) {
   write_xml(*bar(0, 1), folder / "a.vtu");
   const auto refuses = [&](const char* name, const std::string& text, const std::string& file, const char* part) {
     write_bytes(folder / name, text);
-    const std::string error = read_error(folder / name);
-    EXPECT_NE(error.find(file), std::string::npos) << error;
-    EXPECT_NE(error.find(part), std::string::npos) << error;
+    EXPECT_THAT(read_error(folder / name), AllOf(HasSubstr(file), HasSubstr(part)));
   };
   refuses("a.vtm", blocks_of({"none.vtu"}), "none.vtu", "does not exist");
   refuses("a.vtm", blocks_of({"wall.vtp"}), "a.vtm", "names no file of a volume");

@@ -73,10 +73,10 @@ TEST(VtkSourceTest, UnstructuredPiecesAreMergedAndGhostCellsRemoved) {
   }
 
   std::filesystem::remove(folder / "p1.vtu");
-  EXPECT_NE(read_error(folder / "all.pvtu").find("p1.vtu is missing"), std::string::npos);
+  EXPECT_THAT(read_error(folder / "all.pvtu"), HasSubstr("p1.vtu is missing"));
   write_xml(*image(), folder / "image.vti");
   std::filesystem::rename(folder / "image.vti", folder / "p1.vtu");
-  EXPECT_NE(read_error(folder / "all.pvtu").find("p1.vtu: "), std::string::npos);
+  EXPECT_THAT(read_error(folder / "all.pvtu"), HasSubstr("p1.vtu: "));
 }
 
 TEST(VtkSourceTest, ExodusMeshIsNotMovedByItsArrays) {
@@ -135,17 +135,17 @@ TEST(VtkSourceTest, OpenFoamCase) {
 TEST(VtkSourceTest, IncompleteOpenFoamCases) {
   const TemporaryFolder folder;
   const auto error = [&] { return read_error(folder); };
-  EXPECT_NE(error().find("controlDict is missing"), std::string::npos);
+  EXPECT_THAT(error(), HasSubstr("controlDict is missing"));
   OpenFoamCase::write(folder);
   std::filesystem::rename(folder / "constant/polyMesh/owner", folder / "owner");
-  EXPECT_NE(error().find("owner: is missing"), std::string::npos);
+  EXPECT_THAT(error(), HasSubstr("owner: is missing"));
   std::filesystem::rename(folder / "owner", folder / "constant/polyMesh/owner");
   std::filesystem::remove_all(folder / "0");
   std::filesystem::remove_all(folder / "0.5");
-  EXPECT_NE(error().find("time"), std::string::npos);
+  EXPECT_THAT(error(), HasSubstr("time"));
   std::filesystem::create_directories(folder / "processor0");
   std::filesystem::remove_all(folder / "constant");
-  EXPECT_NE(error().find("has no mesh"), std::string::npos);
+  EXPECT_THAT(error(), HasSubstr("has no mesh"));
 }
 
 // Polyhedra as VTK 9.4 writes them: in four arrays of faces.
@@ -377,10 +377,10 @@ TEST(Cgns, HasStepsOfTime) {
 TEST(Cgns, DamageIsOneLine) {
   const TemporaryFolder folder;
   write_bytes(folder / "none.cgns", "no CGNS");
-  EXPECT_NE(read_error(folder / "none.cgns").find("none.cgns"), std::string::npos);
+  EXPECT_THAT(read_error(folder / "none.cgns"), HasSubstr("none.cgns"));
   write_cgns(folder / "a.cgns", CG_FILE_HDF5, 1);
   std::filesystem::resize_file(folder / "a.cgns", std::filesystem::file_size(folder / "a.cgns") / 2);
-  EXPECT_NE(read_error(folder / "a.cgns").find("a.cgns"), std::string::npos);
+  EXPECT_THAT(read_error(folder / "a.cgns"), HasSubstr("a.cgns"));
 }
 
 }  // namespace

@@ -204,23 +204,20 @@ TEST(FieldStatistics, EigenvaluesAndFractions) {
 }
 
 TEST(FieldStatistics, LeavesNonFiniteVoxelsOut) {
-  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
-    return (i.x() > 4 ? std::numeric_limits<double>::quiet_NaN() : 2.0) * Matrix3d::Identity();
-  });
-  const FieldStatistics s = field_statistics(grid);
-  EXPECT_EQ(s.active_voxels, 1000u);
-  EXPECT_EQ(s.non_finite, 300u);
-  EXPECT_EQ(s.index_box.max(), Vector3i(4, 9, 9));
-  EXPECT_NEAR(s.norm[6], 2 * std::sqrt(3.0), 1e-6);
-  EXPECT_EQ(s.real_max, 2);
-}
-
-TEST(FieldStatistics, OfNothingFinite) {
-  const TensorGrid grid = stretched_grid([](const Vector3i&) -> Matrix3d { return Matrix3d::Constant(INFINITY); });
-  const FieldStatistics s = field_statistics(grid);
-  EXPECT_EQ(s.non_finite, 1000u);
-  EXPECT_TRUE(s.index_box.isEmpty());
-  EXPECT_EQ(s.memory_bytes, 0u);
+  const auto statistics = [](int first) {  // Of a field that is not finite from x = first on.
+    return field_statistics(stretched_grid([=](const Vector3i& i) -> Matrix3d {
+      return (i.x() >= first ? std::numeric_limits<double>::quiet_NaN() : 2.0) * Matrix3d::Identity();
+    }));
+  };
+  const FieldStatistics some = statistics(5), none = statistics(-2);
+  EXPECT_EQ(some.active_voxels, 1000u);
+  EXPECT_EQ(some.non_finite, 300u);
+  EXPECT_EQ(some.index_box.max(), Vector3i(4, 9, 9));
+  EXPECT_NEAR(some.norm[6], 2 * std::sqrt(3.0), 1e-6);
+  EXPECT_EQ(some.real_max, 2);
+  EXPECT_EQ(none.non_finite, 1000u);
+  EXPECT_TRUE(none.index_box.isEmpty());
+  EXPECT_EQ(none.memory_bytes, 0u);
 }
 
 TEST(FieldStatistics, DoesNotDependOnThreads) {
