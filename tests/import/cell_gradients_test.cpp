@@ -1,24 +1,17 @@
-// Gradients of vectors at cells: exact for linear ones in every format, at borders, at hanging nodes and between
+// Gradients of vectors at cells: exact for linear ones, at borders, at hanging nodes and between
 // pieces, and of second order for a parabola at a wall.
 
-#include <array>
+#include "tools/import/meshes/cell_gradients.h"
+
 #include <functional>
-#include <map>
 #include <utility>
 
-#include <fmt/format.h>
 #include <vtkCellData.h>
-#include <vtkExodusIIWriter.h>
 #include <vtkUnsignedCharArray.h>
-#include <vtk_cgns.h>
-// clang-format off
-#include VTK_CGNS(cgnslib.h)
-// clang-format on
 
 #include "tests/import/mesh_files.h"
 #include "tests/import/velocity_meshes.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/meshes/cell_gradients.h"
 #include "tools/import/meshes/cell_graph.h"
 
 namespace tensorray {
@@ -29,15 +22,7 @@ using namespace mesh_fixtures;
 TEST(CellGradients, LinearVelocitiesAreExactOnEveryMesh) {
   const TemporaryFolder folder;
   std::vector<std::pair<std::string, vtkSmartPointer<vtkDataSet>>> meshes;
-  auto rectilinear = vtkSmartPointer<vtkRectilinearGrid>::New();
-  vtkNew<vtkDoubleArray> x, y, z;
-  for (const double value : {0.0, 0.1, 0.3, 0.7, 1.5}) x->InsertNextValue(value);
-  for (const double value : {0.0, 0.6, 0.9, 1.0}) y->InsertNextValue(value);
-  for (const double value : {0.0, 0.5, 1.0}) z->InsertNextValue(value);
-  rectilinear->SetDimensions(5, 4, 3);
-  rectilinear->SetXCoordinates(x);
-  rectilinear->SetYCoordinates(y);
-  rectilinear->SetZCoordinates(z);
+  const auto rectilinear = rectilinear_grid({0, 0.1, 0.3, 0.7, 1.5}, {0, 0.6, 0.9, 1}, {0, 0.5, 1});
   meshes.push_back({"graded.vtr", rectilinear});
   meshes.push_back({"oblique.vts", curvilinear({5, 4, 3}, oblique)});
   for (const int type :
@@ -59,10 +44,10 @@ TEST(CellGradients, LinearVelocitiesAreExactOnEveryMesh) {
 }
 
 /// The cells at x < 2, or those beyond, of 4 x 3 x 3 cells; with the next layer as copies if `with_ghosts`.
-Grid half_of_channel(bool first, bool with_ghosts) {
+Grid half_of_channel(bool first, bool with_ghosts, const Velocity& velocity) {
   const double from = first ? 0 : with_ghosts ? 1.5 : 2, to = !first ? 4 : with_ghosts ? 2.5 : 2;
   const Grid grid = boxes(steps(from, to, static_cast<int>(2 * (to - from))), steps(0, 1, 3), steps(0, 1, 3));
-  add_velocity(*grid, linear);
+  add_velocity(*grid, velocity);
   vtkNew<vtkUnsignedCharArray> ghosts;
   ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
   for (vtkIdType i = 0; i < grid->GetNumberOfCells(); ++i)
@@ -77,115 +62,17 @@ TEST(CellGradients, PiecesAreAsGoodAsOneMesh) {
   const Grid whole = boxes(steps(0, 4, 8), steps(0, 1, 3), steps(0, 1, 3));
   add_velocity(*whole, bend);
   write_xml(*whole, folder / "whole.vtu");
-  std::map<std::array<double, 3>, Matrix3d> expected;
-  for_each_voxel(gradients(folder / "whole.vtu", 0.2), [&](const Vector3d& p, const Matrix3d& t) {
-    expected[{p.x(), p.y(), p.z()}] = t;
-  });
+  const TensorGrid expected = gradients(folder / "whole.vtu", 0.2);
   for (const bool with_ghosts : {false, true}) {
     for (const bool first : {true, false}) {
-      const Grid half = half_of_channel(first, with_ghosts);
-      add_velocity(*half, bend);
+      const Grid half = half_of_channel(first, with_ghosts, bend);
       write_xml(*half, folder / (first ? "a.vtu" : "b.vtu"));
     }
     write_bytes(folder / "all.pvtu",
                 "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><Piece Source=\"a.vtu\"/>"
                 "<Piece Source=\"b.vtu\"/></PUnstructuredGrid></VTKFile>");
-    write_bytes(folder / "all.vtm",
-                "<VTKFile type=\"vtkMultiBlockDataSet\"><vtkMultiBlockDataSet><DataSet index=\"0\" "
-                "file=\"a.vtu\"/><DataSet index=\"1\" file=\"b.vtu\"/>"
-                "</vtkMultiBlockDataSet></VTKFile>");
-    for (const char* const name : {"all.pvtu", "all.vtm"})
-      EXPECT_LT(error_in(gradients(folder / name, 0.2),
-                         [&](const Vector3d& p) {
-                           return expected.at({p.x(), p.y(), p.z()});
-                         }),
-                1e-6)
-          << name << with_ghosts;
-  }
-}
-
-std::string numbers_of(vtkDataArray& array) {
-  std::string text;
-  for (vtkIdType i = 0; i < array.GetNumberOfTuples(); ++i)
-    for (int c = 0; c < 3; ++c) text += fmt::format("{:.17g} ", array.GetComponent(i, c));
-  return text;
-}
-
-void write_xdmf(vtkUnstructuredGrid& grid, const std::filesystem::path& path) {
-  const auto count = grid.GetNumberOfCells();
-  std::string cells;
-  for (vtkIdType i = 0; i < count; ++i)
-    for (int k = 0; k < 8; ++k) cells += std::to_string(grid.GetCell(i)->GetPointId(k)) + " ";
-  write_bytes(path, fmt::format(R"(<?xml version="1.0"?><Xdmf Version="3.0"><Domain><Grid Name="a">
-<Topology TopologyType="Hexahedron" NumberOfElements="{0}"><DataItem Dimensions="{0} 8" NumberType="Int" Format="XML">{1}
-</DataItem></Topology><Geometry GeometryType="XYZ"><DataItem Dimensions="{2} 3" Format="XML">{3}</DataItem></Geometry>
-<Attribute Name="U" AttributeType="Vector" Center="Cell"><DataItem Dimensions="{0} 3" Format="XML">{4}</DataItem>
-</Attribute></Grid></Domain></Xdmf>)",
-                                count, cells, grid.GetNumberOfPoints(), numbers_of(*grid.GetPoints()->GetData()),
-                                numbers_of(*grid.GetCellData()->GetArray("U"))));
-}
-
-/// A grid of 4 x 4 x 4 boxes, whose points and cells have the order of CGNS.
-void write_cgns(vtkUnstructuredGrid& grid, const std::filesystem::path& path) {
-  int file = 0, base = 0, zone = 0, id = 0, solution = 0;
-  const std::array<cgsize_t, 9> size{5, 5, 5, 4, 4, 4};
-  cg_open(path.c_str(), CG_MODE_WRITE, &file);
-  cg_base_write(file, "Base", 3, 3, &base);
-  cg_zone_write(file, base, "Zone", size.data(), CGNS_ENUMV(Structured), &zone);
-  cg_sol_write(file, base, zone, "Solution", CGNS_ENUMV(CellCenter), &solution);
-  const auto column = [](vtkDataArray& array, int c) {
-    std::vector<double> values;
-    for (vtkIdType i = 0; i < array.GetNumberOfTuples(); ++i) values.push_back(array.GetComponent(i, c));
-    return values;
-  };
-  for (int c = 0; c < 3; ++c) {
-    cg_coord_write(file, base, zone, CGNS_ENUMV(RealDouble), (std::string("Coordinate") + "XYZ"[c]).c_str(),
-                   column(*grid.GetPoints()->GetData(), c).data(), &id);
-    cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealDouble), (std::string("U") + "XYZ"[c]).c_str(),
-                   column(*grid.GetCellData()->GetArray("U"), c).data(), &id);
-  }
-  ASSERT_EQ(cg_close(file), CG_OK);
-}
-
-/// Gold, in ASCII: numbers have six digits.
-void write_ensight(vtkUnstructuredGrid& grid, const std::filesystem::path& folder) {
-  const auto components = [](vtkDataArray& array) {
-    std::string text;
-    for (int c = 0; c < 3; ++c)
-      for (vtkIdType i = 0; i < array.GetNumberOfTuples(); ++i)
-        text += fmt::format("{:12.5e}\n", array.GetComponent(i, c));
-    return text;
-  };
-  std::string geometry = fmt::format(
-      "one\ntwo\nnode id assign\nelement id assign\npart\n{:10}\nbody\ncoordinates\n{:10}\n{}hexa8\n{:10}\n", 1,
-      grid.GetNumberOfPoints(), components(*grid.GetPoints()->GetData()), grid.GetNumberOfCells());
-  for (vtkIdType i = 0; i < grid.GetNumberOfCells(); ++i, geometry += "\n")
-    for (int k = 0; k < 8; ++k) geometry += fmt::format("{:10}", grid.GetCell(i)->GetPointId(k) + 1);
-  write_bytes(folder / "a.geo", geometry);
-  write_bytes(folder / "a.U",
-              fmt::format("a variable\npart\n{:10}\nhexa8\n{}", 1, components(*grid.GetCellData()->GetArray("U"))));
-  write_bytes(folder / "a.case",
-              "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: a.geo\nVARIABLE\n"
-              "vector per element: U a.U\n");
-}
-
-TEST(CellGradients, FormatsWithCellsAreAlike) {
-  const TemporaryFolder folder;
-  const Grid grid = boxes(steps(0, 2, 4), steps(0, 1, 4), steps(0, 1, 4));
-  add_velocity(*grid, linear);
-  write_legacy(*grid, folder / "a.vtk", true);
-  write_xdmf(*grid, folder / "a.xdmf");
-  write_cgns(*grid, folder / "a.cgns");
-  vtkNew<vtkExodusIIWriter> exodus;
-  exodus->SetFileName((folder / "a.ex2").c_str());
-  exodus->SetInputData(grid);
-  exodus->Write();
-  write_ensight(*grid, folder);
-  for (const char* const name : {"a.vtk", "a.xdmf", "a.cgns", "a.ex2", "a.case"}) {
-    expect_linear(gradients(folder / name, 0.15), name);
-    EXPECT_LT(error_in(gradients(folder / name, 0.15, Take::strain),
-                       [](const Vector3d&) { return Matrix3d(0.5 * (shear() + shear().transpose())); }),
-              2e-5);
+    write_bytes(folder / "all.vtm", blocks_of({"a.vtu", "b.vtu"}));
+    for (const char* const name : {"all.pvtu", "all.vtm"}) expect_alike(gradients(folder / name, 0.2), expected, name);
   }
 }
 

@@ -47,6 +47,13 @@ class Hdf5Writer {
     H5Tclose(type);
   }
 
+  /// What a VTKHDF file begins with.
+  void begin_vtk(const std::string& type, const std::vector<double>& version = {2, 0}) {
+    group("/VTKHDF");
+    attribute("/VTKHDF", "Version", version);
+    attribute("/VTKHDF", "Type", type);
+  }
+
   void attribute(const std::string& object, const std::string& name, const std::vector<double>& values) {
     const hsize_t count = values.size();
     const hid_t space = H5Screate_simple(1, &count, nullptr);

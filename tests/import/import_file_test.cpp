@@ -6,8 +6,8 @@
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 
-#include "base/process/progress.h"
 #include "tests/import/hdf5_writer.h"
+#include "tests/import/imported.h"
 #include "tests/import/mesh_files.h"
 #include "tests/import/openfoam_case.h"
 #include "tests/import/vtk_files.h"
@@ -15,25 +15,19 @@
 namespace tensorray {
 namespace {
 
+using mesh_fixtures::add_array, mesh_fixtures::add_cell_array;
+
 /// VTK complains of each cell that it cannot invert, on every thread.
 TEST(ImportFileTest, FlatCellsAreTakenInSilence) {
   const TemporaryFolder folder;
   const auto mesh = bar(0, 3);
   for (int i = 8; i < 12; ++i) mesh->GetPoints()->SetPoint(i, 1, i % 2, (i - 8) / 2);  // As those before them.
-  vtkNew<vtkDoubleArray> velocity;
-  velocity->SetName("velocity");
-  velocity->SetNumberOfComponents(3);
-  for (int i = 0; i < mesh->GetNumberOfPoints(); ++i) velocity->InsertNextTuple3(i, 2, 3);
-  mesh->GetPointData()->AddArray(velocity);
+  add_array<3>(*mesh, "velocity", [](const Vector3d& p) { return Vector3d(p.x() + p.y(), 2, 3); });
   write_xml(*mesh, folder / "a.vtu");
-  ImportSettings settings;
-  settings.files = {folder / "a.vtu"};
-  settings.array = "velocity";
-  settings.take = Take::gradient;
-  settings.sampling.resolution = 5;
-  ImportReport report;
   testing::internal::CaptureStderr();
-  error_of([&] { import_tensors(settings, Progress(), report); });
+  ImportSettings settings = array_settings("velocity", Take::gradient);
+  settings.sampling.resolution = 5;
+  error_of([&] { imported(folder / "a.vtu", settings); });
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
@@ -45,21 +39,19 @@ TEST(ImportFileTest, NumPyVoxelsAreWhereTheUserSays) {
   write_bytes(folder / "a.npy", std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header + "\n" +
                                     std::string(reinterpret_cast<const char*>(ones.data()), ones.size() * 4));
   ImportSettings settings;
-  settings.files = {folder / "a.npy"};
-  ImportReport report;
-  EXPECT_TRUE(import_tensors(settings, Progress(), report).to_world.matrix().isIdentity());
+  const auto read = [&] { return imported(folder / "a.npy", settings).grid; };
+  EXPECT_TRUE(read().to_world.matrix().isIdentity());
   settings.sampling.resolution = 0.25;
   settings.origin = Eigen::Vector3d(-1, 2, 5);
-  const TensorGrid grid = import_tensors(settings, Progress(), report);
-  EXPECT_EQ(Eigen::Vector3d(grid.to_world * Eigen::Vector3d::Zero()), Eigen::Vector3d(-1, 2, 5));
-  EXPECT_EQ(Eigen::Vector3d(grid.to_world * Eigen::Vector3d(3, 2, 1)), Eigen::Vector3d(-0.25, 2.5, 5.25));
+  const TensorGrid grid = read();
+  EXPECT_EQ(Vector3d(grid.to_world * Vector3d::Zero()), Vector3d(-1, 2, 5));
+  EXPECT_EQ(Vector3d(grid.to_world * Vector3d(3, 2, 1)), Vector3d(-0.25, 2.5, 5.25));
   EXPECT_EQ(grid.active_voxels(), 24u);
   settings.voxel = Eigen::Vector3d(0.5, 0.25, 2);
-  EXPECT_EQ(Eigen::Vector3d(import_tensors(settings, Progress(), report).to_world * Eigen::Vector3d(3, 2, 1)),
-            Eigen::Vector3d(0.5, 2.5, 7));
+  EXPECT_EQ(Vector3d(read().to_world * Vector3d(3, 2, 1)), Vector3d(0.5, 2.5, 7));
   settings.voxel.reset();
-  settings.sampling.bounds = Eigen::AlignedBox3d(Eigen::Vector3d(-1, 2, 5), Eigen::Vector3d(-0.75, 2.5, 5));
-  EXPECT_EQ(import_tensors(settings, Progress(), report).active_voxels(), 6u);  // The bounds are in world space.
+  settings.sampling.bounds = Eigen::AlignedBox3d(Vector3d(-1, 2, 5), Vector3d(-0.75, 2.5, 5));
+  EXPECT_EQ(read().active_voxels(), 6u);  // The bounds are in world space.
 }
 
 /// Its values are at points or at cells; arrays of more than one number do not count.
@@ -86,11 +78,9 @@ TEST(ImportFileTest, AnImageOfVtkMayBeAMask) {
   mask("none.vti", false, 0, 1);
   mask("several.vti", true, 2, 1);
   ImportSettings settings;
-  settings.files = {folder / "a.vti"};
-  ImportReport report;
   const auto active = [&](const char* file) {
     settings.mask = folder / file;
-    return import_tensors(settings, Progress(), report).active_voxels();
+    return imported(folder / "a.vti", settings).voxels();
   };
   EXPECT_EQ(active("points.vti"), 24u);
   EXPECT_EQ(active("cells.vti"), 36u);
@@ -99,12 +89,6 @@ TEST(ImportFileTest, AnImageOfVtkMayBeAMask) {
                                    {"bar.vtu", "a mask has voxels"}})
     EXPECT_THAT(([&active, file = file] { active(file); }),
                 testing::ThrowsMessage<std::invalid_argument>(HasSubstr(text)));
-}
-
-std::string joined(const std::vector<std::string>& lines) {
-  std::string text;
-  for (const std::string& line : lines) text += line + "\n";
-  return text;
 }
 
 /// Two steps, of which the second one was announced and not written: the first one is taken, which is said.
@@ -149,22 +133,17 @@ TEST(ImportFileTest, TheLastCompleteStepIsTaken) {
                        {[&] { return pvd("<VTKFile type=\"UnstructuredGrid\">"); }, "tensor", "second.vtu: is cut off"},
                        {[&] { return openfoam(); }, "gradU", ""}};
   for (const Row& row : table) {
-    ImportSettings settings;
+    ImportSettings settings = array_settings(row.array);
     settings.files = {row.make()};
-    settings.array = row.array;
-    ImportReport report;
-    const TensorGrid grid = import_tensors(settings, Progress(), report);
-    EXPECT_LT(grid.blocks[0].values[0].norm(), 900) << row.words;
-    EXPECT_THAT(joined(report.notes), AllOf(HasSubstr("step 1 of 2 is taken"), HasSubstr(row.words)));
+    const Imported found = imported(settings);
+    EXPECT_LT(found.grid.blocks[0].values[0].norm(), 900) << row.words;
+    EXPECT_THAT(found.notes(), AllOf(HasSubstr("step 1 of 2 is taken"), HasSubstr(row.words)));
     settings.step = 1;
-    EXPECT_ANY_THROW(import_tensors(settings, Progress(), report)) << row.words;
+    EXPECT_ANY_THROW(imported(settings)) << row.words;
   }
-  ImportSettings settings;  // A field may be missing where none was wanted, so that no other step is taken.
-  settings.files = {openfoam()};
-  settings.array = "gradU";
-  std::filesystem::remove(settings.files[0] / "0.5" / "gradU");
-  ImportReport report;
-  EXPECT_THAT([&] { import_tensors(settings, Progress(), report); },
+  // A field may be missing where none was wanted, so that no other step is taken.
+  std::filesystem::remove(openfoam() / "0.5" / "gradU");
+  EXPECT_THAT([&] { imported(folder / "case", array_settings("gradU")); },
               testing::ThrowsMessage<std::invalid_argument>(HasSubstr("(step 2 of 2 is taken; --steps chooses")));
 }
 
@@ -195,14 +174,9 @@ TEST(ImportFileTest, GuessesAndTensorsThatAreHardlyMeantAreSaid) {
       for (int i = 0; i < array.GetNumberOfTuples(); ++i)
         for (int k = 0; k < 9; ++k) array.SetComponent(i, k, row.value(i, k));
       write_xml(*set, folder / ("a" + ending));
-      ImportSettings settings;
-      settings.files = {folder / ("a" + ending)};
-      settings.array = "tensor";
-      ImportReport report;
       std::string said;
       try {
-        import_tensors(settings, Progress(), report);
-        said = joined(report.warnings);
+        said = imported(folder / ("a" + ending), array_settings("tensor")).warnings();
       } catch (const std::exception& error) {
         said = error.what();
       }
@@ -210,22 +184,14 @@ TEST(ImportFileTest, GuessesAndTensorsThatAreHardlyMeantAreSaid) {
       EXPECT_EQ(said.empty(), row.warning[0] == '\0') << row.name << ending << said;
     }
   const auto set = bar(0, 3);
-  vtkNew<vtkDoubleArray> more;
-  more->SetName("tensor");
-  more->SetNumberOfComponents(12);
-  more->SetNumberOfTuples(3);
-  more->Fill(1);
-  set->GetCellData()->AddArray(more);
+  add_cell_array<12>(*set, "tensor", [](vtkIdType) { return Eigen::Matrix<double, 12, 1>::Ones(); });
   write_xml(*set, folder / "a.vtu");
   ImportSettings settings;
-  settings.files = {folder / "a.vtu"};
-  ImportReport report;
-  import_tensors(settings, Progress(), report);
-  EXPECT_THAT(joined(report.notes), HasSubstr("\"tensor\" is at points and at cells: that at points is taken"));
+  EXPECT_THAT(imported(folder / "a.vtu", settings).notes(),
+              HasSubstr("\"tensor\" is at points and at cells: that at points is taken"));
   settings.cell_values = CellValues::constant;
   settings.order = TensorOrder::vtk;
-  import_tensors(settings, Progress(), report);
-  EXPECT_THAT(joined(report.notes),
+  EXPECT_THAT(imported(folder / "a.vtu", settings).notes(),
               AllOf(HasSubstr("that at cells is taken"), HasSubstr("12 components: the first six")));
 }
 

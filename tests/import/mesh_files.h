@@ -27,6 +27,13 @@ using test::TemporaryFolder;  // Not tensorray::TemporaryFolder itself, which th
 
 inline std::filesystem::path data_file(const std::string& name) { return test::data_folder() / name; }
 
+/// The text with the first `from`, which must be there, replaced.
+inline std::string replaced_text(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
 /// The message of the std::runtime_error that `act` throws, which must be one line; empty if it throws nothing.
 template <typename Act>
 std::string error_of(Act&& act) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <utility>
 
+#include <vtkCellData.h>
 #include <vtkCellType.h>
 #include <vtkDataSet.h>
 #include <vtkDoubleArray.h>
@@ -15,8 +16,7 @@
 #include <vtkUnstructuredGrid.h>
 
 #include "base/constants.h"
-#include "tests/names.h"
-#include "volumes/grids/tensor_grid.h"
+#include "tests/volumes/grid_support.h"
 
 namespace tensorray::mesh_fixtures {
 
@@ -37,6 +37,8 @@ inline vtkSmartPointer<vtkStructuredGrid> curvilinear(const Vector3i& nodes, con
   grid->SetPoints(points);
   return grid;
 }
+
+inline Vector3d unchanged(const Vector3d& p) { return p; }
 
 /// Bends the unit cube: moves its inner nodes, and keeps its faces in place.
 inline Vector3d bent(const Vector3d& p) {
@@ -107,6 +109,17 @@ void add_array(vtkDataSet& mesh, const std::string& name,
   mesh.GetPointData()->AddArray(array);
 }
 
+/// Adds a cell array with the values that `value` returns for the numbers of the cells.
+template <int components, class Value>
+void add_cell_array(vtkDataSet& mesh, const std::string& name, const Value& value) {
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name.c_str());
+  array->SetNumberOfComponents(components);
+  for (vtkIdType i = 0; i < mesh.GetNumberOfCells(); ++i)
+    array->InsertNextTuple(Eigen::Matrix<double, components, 1>(value(i)).data());
+  mesh.GetCellData()->AddArray(array);
+}
+
 /// A tensor with nine different linear functions as components.
 inline Matrix3d linear_tensor(const Vector3d& p) {
   Matrix3d a, b, c, d;
@@ -123,11 +136,9 @@ inline Eigen::Matrix<double, 9, 1> flat(const Matrix3d& tensor) {
 }
 
 inline void for_each_voxel(const TensorGrid& grid, const std::function<void(const Vector3d&, const Matrix3d&)>& visit) {
-  for (const TensorBlock& block : grid.blocks)
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-      if (block.active[static_cast<std::size_t>(offset)])
-        visit(grid.to_world * (block.origin + TensorBlock::position(offset)).cast<double>(),
-              block.values[static_cast<std::size_t>(offset)].cast<double>());
+  for_each_active(grid, [&](const Vector3i& index, const Matrix3f& tensor) {
+    visit(grid.to_world * index.cast<double>(), tensor.cast<double>());
+  });
 }
 
 }  // namespace tensorray::mesh_fixtures

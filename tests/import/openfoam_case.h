@@ -19,12 +19,8 @@ class OpenFoamCase {
     OpenFoamCase mesh;
     mesh.part_ = part;
     mesh.make();
-    mesh.write_mesh(folder / "constant" / "polyMesh");
-    write_bytes(
-        folder / "system" / "controlDict",
-        head("dictionary", "controlDict") +
-            "application none;\nstartFrom startTime;\nstartTime 0;\nstopAt endTime;\nendTime 0.5;\ndeltaT 0.5;\n"
-            "writeControl timeStep;\nwriteInterval 1;\n");
+    write_mesh(folder, mesh.rows());
+    write_times(folder, "0.5");
     for (const int at_end : {0, 1}) {
       const std::filesystem::path time = folder / (at_end ? "0.5" : "0");
       mesh.write_field(time / "U", "volVectorField", "vector", 3, at_end);
@@ -32,15 +28,6 @@ class OpenFoamCase {
       mesh.write_field(time / "gradU", "volTensorField", "tensor", 9, at_end);
     }
   }
-
- private:
-  using Face = std::array<int, 4>;
-  struct Side {
-    int owner, neighbour;
-    Face face;
-  };
-
-  static int point(int i, int j, int k) { return i + 3 * (j + 3 * k); }
 
   static std::string head(const std::string& kind, const std::string& object) {
     return "FoamFile\n{\n    version 2.0;\n    format ascii;\n    class " + kind + ";\n    object " + object + ";\n}\n";
@@ -51,6 +38,38 @@ class OpenFoamCase {
     for (const std::string& row : rows) text += row + "\n";
     return text + ")\n";
   }
+
+  /// The last of the times 0 and `end`, and all that a case needs besides its mesh and fields.
+  static void write_times(const std::filesystem::path& folder, const std::string& end) {
+    write_bytes(folder / "system" / "controlDict", head("dictionary", "controlDict") +
+                                                       "application none;\nstartFrom startTime;\nstartTime 0;\nstopAt "
+                                                       "endTime;\nendTime " +
+                                                       end + ";\ndeltaT " + end +
+                                                       ";\nwriteControl timeStep;\nwriteInterval 1;\n");
+  }
+
+  /// What a mesh is made of, as rows of OpenFOAM's lists.
+  struct Mesh {
+    std::vector<std::string> points, faces, owner, neighbour, boundary;
+  };
+
+  static void write_mesh(const std::filesystem::path& folder, const Mesh& mesh) {
+    const std::filesystem::path path = folder / "constant" / "polyMesh";
+    write_bytes(path / "points", head("vectorField", "points") + list(mesh.points));
+    write_bytes(path / "faces", head("faceList", "faces") + list(mesh.faces));
+    write_bytes(path / "owner", head("labelList", "owner") + list(mesh.owner));
+    write_bytes(path / "neighbour", head("labelList", "neighbour") + list(mesh.neighbour));
+    write_bytes(path / "boundary", head("polyBoundaryMesh", "boundary") + list(mesh.boundary));
+  }
+
+ private:
+  using Face = std::array<int, 4>;
+  struct Side {
+    int owner, neighbour;
+    Face face;
+  };
+
+  static int point(int i, int j, int k) { return i + 3 * (j + 3 * k); }
 
   void write_field(const std::filesystem::path& path, const std::string& kind, const std::string& type, int components,
                    int at_end) const {
@@ -83,28 +102,22 @@ class OpenFoamCase {
     (inner ? inner_ : outer_).push_back({owner, neighbour, face});
   }
 
-  void write_mesh(const std::filesystem::path& folder) const {
-    std::vector<std::string> points, faces, owner, neighbour;
-    for (int n = 0; n < 27; ++n) {
-      points.push_back("(" + std::to_string(2 * part_ + n % 3) + " " + std::to_string(0.5 * (n / 3 % 3)) + " " +
-                       std::to_string(2 * (n / 9)) + ")");
-    }
-    for (const auto* sides : {&inner_, &outer_}) {
+  Mesh rows() const {
+    Mesh mesh;
+    for (int n = 0; n < 27; ++n)
+      mesh.points.push_back("(" + std::to_string(2 * part_ + n % 3) + " " + std::to_string(0.5 * (n / 3 % 3)) + " " +
+                            std::to_string(2 * (n / 9)) + ")");
+    for (const auto* sides : {&inner_, &outer_})
       for (const Side& side : *sides) {
         std::string face = "4(";
         for (const int p : side.face) face += std::to_string(p) + " ";
-        faces.push_back(face + ")");
-        owner.push_back(std::to_string(side.owner));
-        if (sides == &inner_) neighbour.push_back(std::to_string(side.neighbour));
+        mesh.faces.push_back(face + ")");
+        mesh.owner.push_back(std::to_string(side.owner));
+        if (sides == &inner_) mesh.neighbour.push_back(std::to_string(side.neighbour));
       }
-    }
-    write_bytes(folder / "points", head("vectorField", "points") + list(points));
-    write_bytes(folder / "faces", head("faceList", "faces") + list(faces));
-    write_bytes(folder / "owner", head("labelList", "owner") + list(owner));
-    write_bytes(folder / "neighbour", head("labelList", "neighbour") + list(neighbour));
-    write_bytes(folder / "boundary", head("polyBoundaryMesh", "boundary") +
-                                         "1\n(\nwalls\n{\n    type wall;\n    nFaces " + std::to_string(outer_.size()) +
-                                         ";\n    startFace " + std::to_string(inner_.size()) + ";\n}\n)\n");
+    mesh.boundary = {"walls\n{\n    type wall;\n    nFaces " + std::to_string(outer_.size()) + ";\n    startFace " +
+                     std::to_string(inner_.size()) + ";\n}"};
+    return mesh;
   }
 
   int part_ = 0;

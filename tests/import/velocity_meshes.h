@@ -1,13 +1,11 @@
 #pragma once
 /// Meshes with a velocity U at cells, and what is imported of its gradient.
 
+#include <array>
 #include <functional>
+#include <map>
 
-#include <vtkCellData.h>
-
-#include "base/process/progress.h"
-#include "tests/import/mesh_fixtures.h"
-#include "tools/import/import_file.h"
+#include "tests/import/imported.h"
 #include "tools/import/vtk/vtk_data_sets.h"
 
 namespace tensorray::mesh_fixtures {
@@ -31,22 +29,11 @@ inline Vector3d mean_of(vtkCell& cell) {
 
 inline void add_velocity(vtkDataSet& mesh, const Velocity& velocity,
                          const std::function<Vector3d(vtkCell&)>& centre = mean_of) {
-  vtkNew<vtkDoubleArray> array;
-  array->SetName("U");
-  array->SetNumberOfComponents(3);
-  for (vtkIdType i = 0; i < mesh.GetNumberOfCells(); ++i)
-    array->InsertNextTuple(velocity(centre(*mesh.GetCell(i))).data());
-  mesh.GetCellData()->AddArray(array);
+  add_cell_array<3>(mesh, "U", [&](vtkIdType i) { return velocity(centre(*mesh.GetCell(i))); });
 }
 
 inline TensorGrid gradients(const std::filesystem::path& file, double voxel, Take take = Take::gradient) {
-  ImportSettings settings;
-  settings.files = {file};
-  settings.array = "U";
-  settings.take = take;
-  settings.sampling.resolution = voxel;
-  ImportReport report;
-  return import_tensors(settings, Progress(), report);
+  return imported(file, array_settings("U", take, voxel)).grid;
 }
 
 inline double error_in(const TensorGrid& grid, const std::function<Matrix3d(const Vector3d&)>& expected) {
@@ -58,6 +45,13 @@ inline double error_in(const TensorGrid& grid, const std::function<Matrix3d(cons
   });
   EXPECT_GT(voxels, 20U);
   return worst;
+}
+
+/// Expects that both have the same voxels, and tensors that differ by less than 1e-6.
+inline void expect_alike(const TensorGrid& grid, const TensorGrid& other, const std::string& name) {
+  std::map<std::array<double, 3>, Matrix3d> expected;
+  for_each_voxel(other, [&](const Vector3d& p, const Matrix3d& t) { expected[{p.x(), p.y(), p.z()}] = t; });
+  EXPECT_LT(error_in(grid, [&](const Vector3d& p) { return expected.at({p.x(), p.y(), p.z()}); }), 1e-6) << name;
 }
 
 inline void expect_linear(const TensorGrid& grid, const std::string& name) {

@@ -1,15 +1,17 @@
 #pragma once
 /// Temporary files of voxels, the data sets, and checks of the results.
 
+#include <array>
+#include <complex>
 #include <cstring>
 #include <functional>
 #include <stdexcept>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 #include "tests/import/mesh_files.h"
+#include "tests/volumes/grid_support.h"
 #include "tools/import/lattices/lattice.h"
+#include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray::test {
 
@@ -20,35 +22,53 @@ std::string bytes_of(const std::vector<Number>& numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
 }
 
-/// The tensor at an index; null if the voxel is inactive.
-inline const Eigen::Matrix3f* voxel(const TensorGrid& grid, const Eigen::Vector3i& index) {
-  for (const TensorBlock& block : grid.blocks) {
-    const Eigen::Vector3i p = index - block.origin;
-    if ((p.array() < 0).any() || (p.array() >= TensorBlock::size).any()) continue;
-    const int offset = TensorBlock::offset(p.x(), p.y(), p.z());
-    return block.active[offset] ? &block.values[offset] : nullptr;
-  }
-  return nullptr;
+/// The components of a symmetric tensor: xx xy xz yy yz zz; and of any one, row by row.
+inline std::vector<float> upper_triangle(const Eigen::Matrix3d& t) {
+  return {static_cast<float>(t(0, 0)), static_cast<float>(t(0, 1)), static_cast<float>(t(0, 2)),
+          static_cast<float>(t(1, 1)), static_cast<float>(t(1, 2)), static_cast<float>(t(2, 2))};
 }
+inline std::vector<float> rows(const Eigen::Matrix3d& t) {
+  std::vector<float> numbers;
+  for (int i = 0; i < 9; ++i) numbers.push_back(static_cast<float>(t(i / 3, i % 3)));
+  return numbers;
+}
+
+inline Eigen::Matrix3d symmetric(const std::array<double, 6>& c) {
+  return (Eigen::Matrix3d() << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5]).finished();
+}
+
+/// Reverses the bytes of a number.
+template <class Number>
+Number swapped(Number number) {
+  auto* bytes = reinterpret_cast<char*>(&number);
+  std::reverse(bytes, bytes + sizeof number);
+  return number;
+}
+
+inline const Eigen::Matrix3f* voxel(const TensorGrid& grid, const Eigen::Vector3i& index) { return find(grid, index); }
 
 inline TensorGrid tensors_of(const Lattice& lattice, std::optional<TensorOrder> order = {}) {
   LatticeReport report;
   return tensors_of(lattice, order, report);
 }
 
+/// The tensor of the first voxel of a file; NaN if it is inactive.
+inline Eigen::Matrix3d first_tensor(const TensorGrid& grid) {
+  const Eigen::Matrix3f* const tensor = voxel(grid, {0, 0, 0});
+  return tensor ? Eigen::Matrix3d(tensor->cast<double>()) : Eigen::Matrix3d(Eigen::Matrix3d::Constant(NAN));
+}
+
 inline void for_each_voxel(const TensorGrid& grid,
                            const std::function<void(const Eigen::Vector3i&, const Eigen::Matrix3d&)>& visit) {
-  for (const TensorBlock& block : grid.blocks)
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-      if (block.active[offset])
-        visit(block.origin + TensorBlock::position(offset), block.values[offset].cast<double>());
+  for_each_active(
+      grid, [&](const Eigen::Vector3i& index, const Eigen::Matrix3f& tensor) { visit(index, tensor.cast<double>()); });
 }
 
 inline std::pair<double, double> eigenvalues_of(const TensorGrid& grid) {
   std::pair<double, double> range{INFINITY, -INFINITY};
   for_each_voxel(grid, [&](const Eigen::Vector3i&, const Eigen::Matrix3d& tensor) {
-    const Eigen::Vector3d values = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(tensor).eigenvalues();
-    range = {std::min(range.first, values.minCoeff()), std::max(range.second, values.maxCoeff())};
+    for (const std::complex<double> value : eigenvalues(tensor))
+      range = {std::min(range.first, value.real()), std::max(range.second, value.real())};
   });
   return range;
 }

@@ -27,6 +27,13 @@ inline std::string read_error(const std::filesystem::path& path, std::optional<i
   return error_in_child(path, [&] { read_vtk_source(path, step); });
 }
 
+/// A .vtm file of these files.
+inline std::string blocks_of(const std::vector<std::string>& files) {
+  std::string text = "<VTKFile type=\"vtkMultiBlockDataSet\"><vtkMultiBlockDataSet>";
+  for (const std::string& file : files) text += "<DataSet file=\"" + file + "\"/>";
+  return text + "</vtkMultiBlockDataSet></VTKFile>\n";
+}
+
 inline double number(const double* x, int c) { return 3 * x[0] - 5 * x[1] + 7 * x[2] + c; }
 
 /// Adds the point array "tensor" with nine components and the cell array "rate" with three.
@@ -58,17 +65,23 @@ inline vtkSmartPointer<vtkImageData> image() {
   return with_arrays(set);
 }
 
-inline vtkSmartPointer<vtkRectilinearGrid> rectilinear() {
+inline vtkSmartPointer<vtkRectilinearGrid> rectilinear_grid(const std::vector<double>& x, const std::vector<double>& y,
+                                                            const std::vector<double>& z) {
+  const auto coordinates = [](const std::vector<double>& values) {
+    auto array = vtkSmartPointer<vtkDoubleArray>::New();
+    for (const double value : values) array->InsertNextValue(value);
+    return array;
+  };
   auto set = vtkSmartPointer<vtkRectilinearGrid>::New();
-  vtkNew<vtkDoubleArray> x, y, z;
-  for (const double value : {0.0, 1.0, 4.0}) x->InsertNextValue(value);
-  for (const double value : {-1.0, 0.5}) y->InsertNextValue(value);
-  for (const double value : {2.0, 3.0, 9.0, 10.0}) z->InsertNextValue(value);
-  set->SetDimensions(3, 2, 4);
-  set->SetXCoordinates(x);
-  set->SetYCoordinates(y);
-  set->SetZCoordinates(z);
-  return with_arrays(set);
+  set->SetDimensions(static_cast<int>(x.size()), static_cast<int>(y.size()), static_cast<int>(z.size()));
+  set->SetXCoordinates(coordinates(x));
+  set->SetYCoordinates(coordinates(y));
+  set->SetZCoordinates(coordinates(z));
+  return set;
+}
+
+inline vtkSmartPointer<vtkRectilinearGrid> rectilinear() {
+  return with_arrays(rectilinear_grid({0, 1, 4}, {-1, 0.5}, {2, 3, 9, 10}));
 }
 
 inline vtkSmartPointer<vtkStructuredGrid> structured() {

@@ -1,6 +1,9 @@
 #pragma once
 /// Grids of tensors, and what is in them.
 
+#include <functional>
+#include <random>
+
 #include "tests/names.h"
 #include "volumes/grids/tensor_grid.h"
 #include "volumes/tensors/eigenvalues.h"
@@ -30,6 +33,23 @@ inline const Eigen::Matrix3f* find(const TensorGrid& grid, const Eigen::Vector3i
     if (i == index) found = &value;
   });
   return found;
+}
+
+/// Takes the voxels away that `is_gone` names by their indices.
+inline void clear_voxels(TensorBlocks& blocks, const std::function<bool(const Eigen::Vector3i&)>& is_gone) {
+  for (TensorBlock& block : blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!is_gone(block.origin + TensorBlock::position(offset))) continue;
+      block.active.reset(offset);
+      block.values[offset].setZero();
+    }
+  remove_empty_blocks(blocks);
+}
+
+inline Eigen::Vector3d random_point(std::mt19937& random, const Eigen::AlignedBox3d& box) {
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const Eigen::Vector3d part = Eigen::Vector3d::NullaryExpr([&] { return uniform(random); });
+  return box.min() + part.cwiseProduct(box.sizes());
 }
 
 inline void expect_same_blocks(const TensorGrid& a, const TensorGrid& b) {

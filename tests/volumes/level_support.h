@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "tests/volumes/grid_support.h"
 #include "volumes/grids/block_source.h"
 #include "volumes/grids/tensor_grid.h"
 
@@ -18,16 +19,10 @@ inline void add_level(TensorGrid& grid, const Eigen::AlignedBox3i& box, const Re
   const Eigen::AlignedBox3i extent(scale * box.min(), scale * box.max());
   TensorGrid level = dense_grid(extent, Eigen::Affine3d::Identity(),
                                 [&](const Eigen::Vector3i& index) { return value(index.cast<double>() / scale); });
-  for (TensorBlock& block : level.blocks)
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
-      const Eigen::Vector3i index = block.origin + TensorBlock::position(offset);
-      const Eigen::Vector3i cell = index.cwiseMin((extent.max().array() - 1).matrix().cwiseMax(extent.min()));
-      if (!refines(cell.unaryExpr([](int i) { return i >> 4; }))) {
-        block.active.reset(static_cast<std::size_t>(offset));
-        block.values[static_cast<std::size_t>(offset)].setZero();
-      }
-    }
-  remove_empty_blocks(level.blocks);
+  clear_voxels(level.blocks, [&](const Eigen::Vector3i& index) {
+    const Eigen::Vector3i cell = index.cwiseMin((extent.max().array() - 1).matrix().cwiseMax(extent.min()));
+    return !refines(cell.unaryExpr([](int i) { return i >> 4; }));
+  });
   grid.finer.push_back(std::move(level.blocks));
 }
 

@@ -2,31 +2,21 @@
 
 #include <tuple>
 
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <vtkCellData.h>
 #include <vtkPointData.h>
 
-#include "base/process/progress.h"
+#include "tests/import/imported.h"
 #include "tests/import/mesh_files.h"
-#include "tests/import/mesh_fixtures.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/import_file.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
 namespace {
 
-std::string number(double value) {
-  char text[16];
-  std::snprintf(text, sizeof text, "%12.5e\n", value);
-  return text;
-}
-
-std::string integer(int value) {
-  char text[16];
-  std::snprintf(text, sizeof text, "%10d", value);
-  return text;
-}
+std::string number(double value) { return fmt::format("{:12.5e}\n", value); }
+std::string integer(int value) { return fmt::format("{:10}", value); }
 
 /// Values of a variable: for each component, as many equal values as there are points or cells.
 std::string variable(const std::string& of, int count, const std::vector<double>& components) {
@@ -51,26 +41,22 @@ void write_case(const std::filesystem::path& folder) {
     write_bytes(folder / (name + ".sym"), variable("coordinates", 8, {t + 11, 22, 33, 12, 13, 23}));
     write_bytes(folder / (name + ".gen"), variable("coordinates", 8, {t + 11, 12, 13, 21, 22, 23, 31, 32, 33}));
     write_bytes(folder / (name + ".ele"), variable("hexa8", 1, {t + 11, 22, 33, 12, 13, 23}));
+    write_bytes(folder / (name + ".vec"), variable("hexa8", 1, {t + 1, 2, 3}));
   }
   write_bytes(folder / "a.case",
               "# a comment\nFORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: a.geo\n\nVARIABLE\n"
               "tensor symm per node: 1 symmetric a.*.sym\ntensor asym per node: 1 general a.*.gen\n"
-              "tensor symm per element: 1 of_cells a.*.ele\n\nTIME\ntime set: 1\nnumber of steps: 2\n"
+              "tensor symm per element: 1 of_cells a.*.ele\n"
+              "vector per element: 1 velocity a.*.vec\n\nTIME\ntime set: 1\nnumber of steps: 2\n"
               "filename start number: 0\nfilename increment: 1\ntime values: 0.5 2.5\n");
 }
 
 Matrix3d tensor_of(const std::filesystem::path& path, const std::string& array, std::optional<int> step = {}) {
-  ImportSettings settings;
-  settings.files = {path};
-  settings.array = array;
+  ImportSettings settings = array_settings(array, Take::tensor, 2);
   settings.step = step;
-  settings.sampling.resolution = 2;
-  ImportReport report;
-  const TensorGrid grid = import_tensors(settings, Progress(), report);
-  Matrix3d tensor = Matrix3d::Constant(NAN);
-  mesh_fixtures::for_each_voxel(grid, [&](const auto&, const Matrix3d& value) { tensor = value; });
-  EXPECT_EQ(grid.active_voxels(), 8u);
-  return tensor;
+  const Imported found = imported(path, settings);
+  EXPECT_EQ(found.voxels(), 8u);
+  return found.tensor();
 }
 
 TEST(EnSight, TensorsHaveTheirOrderWithoutBeingTold) {
@@ -82,6 +68,9 @@ TEST(EnSight, TensorsHaveTheirOrderWithoutBeingTold) {
   EXPECT_LT((tensor_of(folder / "a.case", "symmetric") - symmetric).norm(), 1e-3);
   EXPECT_LT((tensor_of(folder / "a.case", "of_cells") - symmetric).norm(), 1e-3);
   EXPECT_LT((tensor_of(folder / "a.case", "general") - general).norm(), 1e-3);
+  const auto read = read_vtk_source(folder / "a.case");
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(read->GetCellData()->GetArray("velocity")->GetComponent(0, c), c == 0 ? 101 : c + 1, 1e-3);
 }
 
 TEST(EnSight, NamesInQuotesMayHaveBlanks) {
@@ -96,41 +85,33 @@ TEST(EnSight, NamesInQuotesMayHaveBlanks) {
   for (const auto& [model, array, name, file] :
        {std::tuple("\"a.geo\"", "general", "general", "\"a.*.gen\""),
         {"\"my data/the mesh.geo\"", "\"my tensor\"", "my_tensor", "\"my data/the general.*\""}}) {
-    std::string text = sound;
-    text.replace(text.find("a.geo"), 5, model);
-    text.replace(text.find("general a.*.gen"), 15, std::string(array) + "   " + file);
-    write_bytes(folder / "a.case", text);
+    write_bytes(folder / "a.case", replaced_text(replaced_text(sound, "a.geo", model), "general a.*.gen",
+                                                 std::string(array) + "   " + file));
     EXPECT_EQ(time_steps(folder / "a.case"), 2);
     for (const int step : {0, 1}) EXPECT_NEAR(tensor_of(folder / "a.case", name, step)(0, 0), 100 * step + 11, 1e-4);
     EXPECT_THROW(tensor_of(folder / "a.case", name, 2), std::invalid_argument);
     EXPECT_NEAR(tensor_of(folder / "a.case", "symmetric")(0, 1), 12, 1e-4);
   }
   std::filesystem::remove(folder / "my data/the mesh.geo");
-  EXPECT_NE(read_error(folder / "a.case").find("the mesh.geo: is missing"), std::string::npos);
+  EXPECT_THAT(read_error(folder / "a.case"), HasSubstr("the mesh.geo: is missing"));
 }
 
-/// VTK seeks the steps in all files of such a case, for ever in those without.
-TEST(EnSight, StepsInOneFileAreRefusedWhereOthersHaveNone) {
+/// VTK seeks the steps in all files of such a case, for ever in those without, and goes on for ever with some damaged
+/// cases; it repeats the last number of a text that is cut off.
+TEST(EnSight, StepsInOneFileAreRefusedWhereOthersHaveNoneAndDescriptionsAnnounceNothing) {
   const TemporaryFolder folder;
   write_case(folder);
-  std::string text = bytes_of(folder / "a.case");
-  text.replace(text.find("1 symmetric a.*.sym"), 19, "1 1 symmetric a.sym");
-  write_bytes(folder / "a.case", text + "FILE\nfile set: 1\nnumber of steps: 2\n");
+  const std::string geometry = bytes_of(folder / "a.geo"), sound = bytes_of(folder / "a.case");
+  const std::size_t third = geometry.find('\n', geometry.find('\n') + 1) + 1;
+  write_bytes(folder / "a.geo", "point\n99999999 particles in the run\n" + geometry.substr(third));
+  EXPECT_EQ(read_error(folder / "a.case"), "");
+  write_bytes(folder / "a.case", replaced_text(sound, "1 symmetric a.*.sym", "1 1 symmetric a.sym") +
+                                     "FILE\nfile set: 1\nnumber of steps: 2\n");
   std::string steps;
   for (const char* step : {"a.0.sym", "a.1.sym"})
     steps += "BEGIN TIME STEP\n" + bytes_of(folder / step) + "END TIME STEP\n";
   write_bytes(folder / "a.sym", steps);
-  EXPECT_NE(read_error(folder / "a.case").find("a.geo: has no steps of time"), std::string::npos);
-}
-
-/// VTK itself repeats the last number of a text that is cut off, and goes on for ever with some damaged cases.
-TEST(EnSight, DescriptionsAnnounceNothing) {
-  const TemporaryFolder folder;
-  write_case(folder);
-  const std::string text = bytes_of(folder / "a.geo");
-  const std::size_t second = text.find('\n') + 1, third = text.find('\n', second) + 1;
-  write_bytes(folder / "a.geo", "point\n99999999 particles in the run\n" + text.substr(third));
-  EXPECT_EQ(read_error(folder / "a.case"), "");
+  EXPECT_THAT(read_error(folder / "a.case"), HasSubstr("a.geo: has no steps of time"));
 }
 
 TEST(EnSight, WhatIsCutOffOrMissingIsNamed) {
@@ -138,13 +119,9 @@ TEST(EnSight, WhatIsCutOffOrMissingIsNamed) {
   const auto error = [&] { return read_error(folder / "a.case", 1); };
   write_case(folder);
   const std::string sound = bytes_of(folder / "a.case");
-  const auto damage = [&](const std::string& from, const std::string& to) {
-    std::string text = sound;
-    write_bytes(folder / "a.case", text.replace(text.find(from), from.size(), to));
-  };
   for (const char* section : {"VARIABLE", "GEOMETRY", "TIME"}) {
-    damage(section, "V0R");
-    EXPECT_NE(error().find("is neither a section of EnSight nor an entry: 'V0R'"), std::string::npos) << error();
+    write_bytes(folder / "a.case", replaced_text(sound, section, "V0R"));
+    EXPECT_THAT(error(), HasSubstr("is neither a section of EnSight nor an entry: 'V0R'"));
   }
   write_bytes(folder / "a.case", sound);
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -155,17 +132,17 @@ TEST(EnSight, WhatIsCutOffOrMissingIsNamed) {
       for (std::size_t i = 0; i < lines; ++i) end = text.rfind('\n', end - 1);
       write_bytes(entry.path(), text.substr(0, end + 1));
       if (error().empty()) continue;  // It is of another step.
-      EXPECT_NE(error().find(entry.path().filename().string() + ": is cut off"), std::string::npos) << error();
+      EXPECT_THAT(error(), HasSubstr(entry.path().filename().string() + ": is cut off"));
     }
     write_bytes(entry.path(), text);
   }
   EXPECT_EQ(error(), "");
   write_bytes(folder / "b.case", "no case\n");
-  EXPECT_NE(read_error(folder / "b.case").find("is not a case of EnSight"), std::string::npos);
+  EXPECT_THAT(read_error(folder / "b.case"), HasSubstr("is not a case of EnSight"));
   std::filesystem::remove(folder / "a.geo");
-  EXPECT_NE(error().find("a.geo: is missing, which a.case names"), std::string::npos) << error();
+  EXPECT_THAT(error(), HasSubstr("a.geo: is missing, which a.case names"));
   ASSERT_EQ(mkfifo((folder / "a.geo").c_str(), 0600), 0);  // To open a pipe takes for ever.
-  EXPECT_NE(error().find("a.geo: is a pipe or a device"), std::string::npos) << error();
+  EXPECT_THAT(error(), HasSubstr("a.geo: is a pipe or a device"));
 }
 
 }  // namespace

@@ -8,12 +8,10 @@
 #include <vtk_exodusII.h>
 #include <vtk_netcdf.h>
 
-#include "base/process/progress.h"
 #include "base/text/byte_order.h"
+#include "tests/import/imported.h"
 #include "tests/import/mesh_files.h"
-#include "tests/import/mesh_fixtures.h"
 #include "tools/import/cases/case_files.h"
-#include "tools/import/import_file.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
@@ -22,16 +20,21 @@ namespace {
 using namespace mesh_fixtures;
 using Path = std::filesystem::path;
 
+/// Of the nodes of a row of unit cubes from x = first on.
+std::vector<double> coordinates(int nodes, int axis, int first = 0) {
+  std::vector<double> x;
+  for (int i = 0; i < nodes; ++i) x.push_back(axis == 0 ? first + i / 4 : axis == 1 ? i % 2 : i % 4 / 2);
+  return x;
+}
+
 /// A row of unit cubes from x = first on. At step k from 1 on, the gradient of v is k diag(1, 2, 3), and the stress of
 /// all cells is k (11, 22, 33, 12, 23, 13). @param mode  EX_LARGE_MODEL or EX_NETCDF4.
 void write_bar(const Path& path, int steps, int mode = EX_LARGE_MODEL, int first = 0, int cubes = 2) {
   int word = 8, stored = 8;
   const int file = ex_create(path.c_str(), EX_CLOBBER | mode, &word, &stored), nodes = 4 * (cubes + 1);
   ASSERT_GE(file, 0);
-  std::array<std::vector<double>, 3> x;
+  const std::vector<double> x[] = {coordinates(nodes, 0, first), coordinates(nodes, 1), coordinates(nodes, 2)};
   std::vector<int> corners;
-  for (int i = 0; i < nodes; ++i)
-    for (int axis = 0; axis < 3; ++axis) x[axis].push_back(axis == 0 ? first + i / 4 : axis == 1 ? i % 2 : i % 4 / 2);
   for (int cube = 0; cube < cubes; ++cube)
     for (const int corner : {1, 5, 6, 2, 3, 7, 8, 4}) corners.push_back(4 * cube + corner);
   ex_put_init(file, "bar", 3, nodes, cubes, 1, 0, 0);
@@ -93,28 +96,12 @@ void set_aside(const Path& path, const std::string& name) {
   });
 }
 
-struct Imported {
-  Matrix3d tensor = Matrix3d::Zero();  ///< At all voxels.
-  std::size_t cells = 0, voxels = 0;
-  std::string notes;
-};
-
+/// Imports pieces of one mesh with voxels of 1/2.
 Imported import(const std::vector<Path>& files, const std::string& array, Take take, std::optional<int> step = {}) {
-  ImportSettings settings;
+  ImportSettings settings = array_settings(array, take, 0.5);
   settings.files = files;
-  settings.array = array;
-  settings.take = take;
   settings.step = step;
-  settings.sampling.resolution = 0.5;
-  ImportReport report;
-  Imported result;
-  const TensorGrid grid = import_tensors(settings, Progress(), report);
-  for_each_voxel(grid, [&](const auto&, const Matrix3d& value) { result.tensor = value; });
-  for_each_voxel(grid, [&](const auto&, const Matrix3d& value) { EXPECT_LT((value - result.tensor).norm(), 1e-5); });
-  for (const std::string& note : report.notes) result.notes += note + "\n";
-  result.cells = report.mesh_cells;
-  result.voxels = grid.active_voxels();
-  return result;
+  return imported(settings);
 }
 
 std::string refusal(const Path& path, const char* array, Take take) {
@@ -129,10 +116,10 @@ std::string expect_step(const Path& path, int step, std::optional<int> asked = {
   stress << 11, 12, 13, 12, 22, 23, 13, 23, 33;
   const Matrix3d gradient = Eigen::Vector3d(1, 2, 3).asDiagonal();
   const Imported v = import({path}, "v_", Take::gradient, asked), s = import({path}, stress_list, Take::tensor, asked);
-  EXPECT_LT((v.tensor - step * gradient).norm(), 1e-5) << path;
-  EXPECT_LT((s.tensor - step * stress).norm(), 1e-4) << path;
-  EXPECT_EQ(v.notes, s.notes);
-  return v.notes;
+  EXPECT_LT((v.tensor() - step * gradient).norm(), 1e-5) << path;
+  EXPECT_LT((s.tensor() - step * stress).norm(), 1e-4) << path;
+  EXPECT_EQ(v.notes(), s.notes());
+  return v.notes();
 }
 
 constexpr std::array modes{EX_LARGE_MODEL, EX_NETCDF4};
@@ -179,7 +166,7 @@ TEST(Exodus, FillValuesAreHoles) {
   EXPECT_EQ(expect_step(folder / "a.e", 1), "");
   fill(folder / "a.e", "vals_nod_var1", 1);
   EXPECT_THAT(refusal(folder / "a.e", "v_", Take::gradient), HasSubstr("have NaN or infinite tensors"));
-  EXPECT_GT(import({folder / "a.e"}, stress_list, Take::tensor).voxels, 0u);
+  EXPECT_GT(import({folder / "a.e"}, stress_list, Take::tensor).voxels(), 0u);
 }
 
 TEST(Exodus, VariablesThatAreNotThereAreLeftOut) {
@@ -189,11 +176,11 @@ TEST(Exodus, VariablesThatAreNotThereAreLeftOut) {
   write_bar(path, 2);
   set_aside(path, "vals_nod_var2");
   EXPECT_THAT(refusal(path, "v_", Take::gradient), left_out("left out: \"v_y\""));
-  EXPECT_NEAR(import({path}, stress_list, Take::tensor).tensor(0, 0), 22, 1e-4);
+  EXPECT_NEAR(import({path}, stress_list, Take::tensor).tensor()(0, 0), 22, 1e-4);
   write_bar(path, 2);
   set_aside(path, "vals_elem_var2eb1");
   EXPECT_THAT(refusal(path, stress_list, Take::tensor), left_out("left out: \"s_yy\""));
-  EXPECT_NEAR(import({path}, "v_", Take::gradient).tensor(1, 1), 4, 1e-4);
+  EXPECT_NEAR(import({path}, "v_", Take::gradient).tensor()(1, 1), 4, 1e-4);
   write_bar(path, 2);
   set_aside(path, "vals_nod_var2");
   change(path, [](int file) {  // As numbers of other nodes, of which the reader would read the first ones.
@@ -215,8 +202,8 @@ TEST(Exodus, VariablesThatAreNotThereAreLeftOut) {
     nc_def_var(file, "coord", NC_DOUBLE, 2, dimensions, &id);
     nc_enddef(file);
     std::vector<double> x;
-    for (const auto axis : {0, 1, 2})
-      for (int i = 0; i < 12; ++i) x.push_back(axis == 0 ? i / 4 : axis == 1 ? i % 2 : i % 4 / 2);
+    for (const int axis : {0, 1, 2})
+      for (const double value : coordinates(12, axis)) x.push_back(value);
     nc_put_var_double(file, id, x.data());
   });
   EXPECT_THAT(refusal(path, "v_", Take::gradient), left_out("meshio convert a.e FILE.vtu"));
@@ -230,10 +217,10 @@ TEST(Exodus, PiecesOfNemesisAreOneMesh) {
     write_bar(second, 3, mode, 2, 3);
     for (const std::vector<Path>& files : {std::vector{first}, {second}, {first, second}, {second, first}}) {
       const Imported all = import(files, "v_", Take::gradient);
-      EXPECT_EQ(all.cells, 5u);
-      EXPECT_EQ(all.voxels, 11u * 3 * 3);
-      EXPECT_NEAR(all.tensor(2, 2), 9, 1e-5);
-      EXPECT_THAT(all.notes, HasSubstr("one of 2 pieces of a mesh (Nemesis): all are read"));
+      EXPECT_EQ(all.report.mesh_cells, 5u);
+      EXPECT_EQ(all.voxels(), 11u * 3 * 3);
+      EXPECT_NEAR(all.tensor()(2, 2), 9, 1e-5);
+      EXPECT_THAT(all.notes(), HasSubstr("one of 2 pieces of a mesh (Nemesis): all are read"));
     }
     EXPECT_EQ(read_vtk_source(first)->GetNumberOfPoints(), 24);  // Those between both are the same.
   }
@@ -246,7 +233,7 @@ TEST(Exodus, PiecesOfNemesisAreOneMesh) {
   EXPECT_THAT(error_of([&] { import({folder / "out.e.12.07"}, "v_", Take::gradient); }),
               HasSubstr("of which are missing: out.e.12.00 out.e.12.01"));
   write_bar(folder / "run.2.5.e", 1);  // No piece.
-  EXPECT_EQ(import({folder / "run.2.5.e"}, "v_", Take::gradient).cells, 2u);
+  EXPECT_EQ(import({folder / "run.2.5.e"}, "v_", Take::gradient).report.mesh_cells, 2u);
 }
 
 /// A header of version 5, with 64-bit lengths: one dimension, no attribute, one variable of doubles, whose last one

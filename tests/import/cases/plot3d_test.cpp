@@ -14,6 +14,8 @@ struct Form {
   bool big_endian = false, marks = false, count = false, blanking = false, doubles = false;
 };
 
+Form form_of(int bits) { return {bool(bits & 1), bool(bits & 2), bool(bits & 4), bool(bits & 8), bool(bits & 16)}; }
+
 class Writer {
  public:
   explicit Writer(const Form& form) : form_(form) {}
@@ -105,7 +107,7 @@ void expect_content(vtkDataSet& mesh, const Form& form) {
 TEST(Plot3dTest, EveryForm) {
   const TemporaryFolder folder;
   for (int bits = 0; bits < 32; ++bits) {
-    const Form form{bool(bits & 1), bool(bits & 2), bool(bits & 4), bool(bits & 8), bool(bits & 16)};
+    const Form form = form_of(bits);
     SCOPED_TRACE(bits);
     const auto mesh = read(folder, grid_bytes(form), q_bytes(form));
     expect_content(*mesh, form);
@@ -127,10 +129,10 @@ TEST(Plot3dTest, FilesThatAreCutOffOrDoNotFitAreErrors) {
   const TemporaryFolder folder;
   const auto refuses = [&](const std::string& grid, const std::string& q, const std::string& name) {
     const std::string error = error_in_child(folder / name, [&] { read(folder, grid, q); });
-    EXPECT_NE(error.find(name + ": "), std::string::npos) << error;
+    EXPECT_THAT(error, HasSubstr(name + ": "));
   };
   for (int bits = 0; bits < 32; bits += 3) {
-    const Form form{bool(bits & 1), bool(bits & 2), bool(bits & 4), bool(bits & 8), bool(bits & 16)};
+    const Form form = form_of(bits);
     const std::string grid = grid_bytes(form), q = q_bytes(form);
     SCOPED_TRACE(bits);
     for (const std::size_t cut : {12, 100, 700}) {  // A record mark is no number.

@@ -147,12 +147,17 @@ TEST(Hdf5File, LinksToOtherFiles) {
 }
 
 // VTKHDF files, written dataset by dataset as the format prescribes.
+/// 0, 1, ... count − 1.
+Doubles counting(int count) {
+  Doubles values;
+  for (int i = 0; i < count; ++i) values.push_back(i);
+  return values;
+}
+
 /// Two parts, a tetrahedron each, with a common face; and, if wanted, two steps of the values, on the same mesh.
 void write_grid(const std::filesystem::path& path, bool with_steps, double version = 2) {
   Hdf5Writer file(path);
-  file.group("/VTKHDF");
-  file.attribute("/VTKHDF", "Version", Doubles{version, 0});
-  file.attribute("/VTKHDF", "Type", "UnstructuredGrid");
+  file.begin_vtk("UnstructuredGrid", {version, 0});
   file.write("/VTKHDF/NumberOfPoints", {2}, Ints{4, 4});
   file.write("/VTKHDF/NumberOfCells", {2}, Ints{1, 1});
   file.write("/VTKHDF/NumberOfConnectivityIds", {2}, Ints{4, 4});
@@ -161,11 +166,8 @@ void write_grid(const std::filesystem::path& path, bool with_steps, double versi
   file.write("/VTKHDF/Offsets", {4}, Ints{0, 4, 0, 4});
   file.write("/VTKHDF/Types", {2}, Ints{10, 10});
   const int steps = with_steps ? 2 : 1;
-  Doubles at_points, at_cells;
-  for (int i = 0; i < 8 * steps; ++i) at_points.push_back(i);
-  for (int i = 0; i < 2 * 9 * steps; ++i) at_cells.push_back(i);
-  file.write("/VTKHDF/PointData/f", {static_cast<hsize_t>(8 * steps)}, at_points);
-  file.write("/VTKHDF/CellData/T", {static_cast<hsize_t>(2 * steps), 9}, at_cells);
+  file.write("/VTKHDF/PointData/f", {static_cast<hsize_t>(8 * steps)}, counting(8 * steps));
+  file.write("/VTKHDF/CellData/T", {static_cast<hsize_t>(2 * steps), 9}, counting(2 * 9 * steps));
   if (!with_steps) return;
   file.group("/VTKHDF/Steps");
   file.attribute("/VTKHDF/Steps", "NSteps", Doubles{2});
@@ -195,9 +197,7 @@ TEST(VtkHdf, PartsAreMergedAndStepsAreRead) {
 
 /// An image of 3 x 2 x 2 points.
 void begin_image(Hdf5Writer& file, const Doubles& version, const Doubles& origin, const Doubles& spacing) {
-  file.group("/VTKHDF");
-  file.attribute("/VTKHDF", "Version", version);
-  file.attribute("/VTKHDF", "Type", "ImageData");
+  file.begin_vtk("ImageData", version);
   file.attribute("/VTKHDF", "WholeExtent", Doubles{0, 2, 0, 1, 0, 1});
   file.attribute("/VTKHDF", "Origin", origin);
   file.attribute("/VTKHDF", "Spacing", spacing);
@@ -208,9 +208,7 @@ TEST(VtkHdf, Images) {
   {
     Hdf5Writer file(folder / "a.hdf");
     begin_image(file, Doubles{1, 0}, Doubles{1, 2, 3}, Doubles{0.5, 1, 2});
-    Doubles values;
-    for (int i = 0; i < 12 * 3; ++i) values.push_back(i);
-    file.write("/VTKHDF/PointData/v", {2, 2, 3, 3}, values);
+    file.write("/VTKHDF/PointData/v", {2, 2, 3, 3}, counting(12 * 3));
   }
   const auto image = read_vtk_source(folder / "a.hdf");
   ASSERT_TRUE(vtkImageData::SafeDownCast(image));
@@ -227,13 +225,10 @@ TEST(VtkHdf, ArraysOfImagesMayStay) {
     begin_image(file, Doubles{2, 0}, Doubles{0, 0, 0}, Doubles{1, 1, 1});
     file.group("/VTKHDF/Steps");
     file.attribute("/VTKHDF/Steps", "NSteps", Doubles{2});
-    Doubles values;
-    for (int i = 0; i < 12 * 3 * 2; ++i) values.push_back(i);
-    file.write("/VTKHDF/PointData/moving", {2, 2, 2, 3, 3}, values);
-    file.write("/VTKHDF/PointData/named", {2, 2, 2, 3, 3}, values);
+    file.write("/VTKHDF/PointData/moving", {2, 2, 2, 3, 3}, counting(2 * 12 * 3));
+    file.write("/VTKHDF/PointData/named", {2, 2, 2, 3, 3}, counting(2 * 12 * 3));
     file.write("/VTKHDF/Steps/PointDataOffsets/named", {2}, Ints{1, 0});
-    values.resize(12 * 3);
-    file.write("/VTKHDF/PointData/still", {2, 2, 3, 3}, values);
+    file.write("/VTKHDF/PointData/still", {2, 2, 3, 3}, counting(12 * 3));
     file.text("/VTKHDF/PointData/label", "water");
   }
   for (const int step : {0, 1}) {
@@ -249,39 +244,39 @@ TEST(VtkHdf, ArraysOfImagesMayStay) {
 
 TEST(VtkHdf, DamageAndOtherKindsAreErrorsWithTheFile) {
   const TemporaryFolder folder;
-  const auto error = [&] { return read_error(folder / "a.vtkhdf"); };
-  write_grid(folder / "a.vtkhdf", false, 3);
-  EXPECT_THAT(error(), HasSubstr("a.vtkhdf: is of version 3"));
-  {
-    Hdf5Writer file(folder / "a.vtkhdf");
-    begin_image(file, Doubles{2, 0}, Doubles{0, 0, 0}, Doubles{1, 1, 1});
-    file.announce("/VTKHDF/PointData/v", {1 << 30, 1 << 20});  // None of these numbers was written.
+  const std::filesystem::path path = folder / "a.vtkhdf";
+  struct Row {
+    std::function<void()> write;
+    const char* words;
+  };
+  const Row table[] = {
+      {[&] { write_grid(path, false, 3); }, "a.vtkhdf: is of version 3"},
+      {[&] {
+         Hdf5Writer file(path);
+         begin_image(file, {2, 0}, {0, 0, 0}, {1, 1, 1});
+         file.announce("/VTKHDF/PointData/v", {1 << 30, 1 << 20});  // None of these numbers was written.
+       },
+       "a.vtkhdf: is damaged, or too large: it announces more than memory holds"},
+      {[&] {
+         write_grid(path, false);
+         std::filesystem::resize_file(path, file_size(path) / 2);
+       },
+       "a.vtkhdf: is no HDF5 file, or cut off"},
+      {[&] { Hdf5Writer(path).write("/x", {1}, Ints{1}); }, "no group VTKHDF"},
+      {[&] { Hdf5Writer(path).begin_vtk("PolyData"); }, "PolyData"},
+      {[&] {
+         Hdf5Writer file(path);
+         file.begin_vtk("UnstructuredGrid");
+         file.write("/VTKHDF/NumberOfPoints", {1}, Ints{4});
+         file.write("/VTKHDF/NumberOfCells", {1}, Ints{1});
+         file.write("/VTKHDF/NumberOfConnectivityIds", {1}, Ints{4});
+         file.write("/VTKHDF/Points", {3, 3}, Doubles(9, 0));
+       },
+       "Points is smaller"}};
+  for (const Row& row : table) {
+    row.write();
+    EXPECT_THAT(read_error(path), HasSubstr(row.words));
   }
-  EXPECT_THAT(error(), HasSubstr("a.vtkhdf: is damaged, or too large: it announces more than memory holds"));
-  write_grid(folder / "a.vtkhdf", false);
-  const std::string sound = bytes_of(folder / "a.vtkhdf");
-  write_bytes(folder / "a.vtkhdf", sound.substr(0, sound.size() / 2));
-  EXPECT_THAT(error(), HasSubstr("a.vtkhdf: is no HDF5 file, or cut off"));
-  { Hdf5Writer(folder / "a.vtkhdf").write("/x", {1}, Ints{1}); }
-  EXPECT_THAT(error(), HasSubstr("no group VTKHDF"));
-  {
-    Hdf5Writer file(folder / "a.vtkhdf");
-    file.group("/VTKHDF");
-    file.attribute("/VTKHDF", "Version", Doubles{2, 0});
-    file.attribute("/VTKHDF", "Type", "PolyData");
-  }
-  EXPECT_THAT(error(), HasSubstr("PolyData"));
-  {
-    Hdf5Writer file(folder / "a.vtkhdf");
-    file.group("/VTKHDF");
-    file.attribute("/VTKHDF", "Version", Doubles{2, 0});
-    file.attribute("/VTKHDF", "Type", "UnstructuredGrid");
-    file.write("/VTKHDF/NumberOfPoints", {1}, Ints{4});
-    file.write("/VTKHDF/NumberOfCells", {1}, Ints{1});
-    file.write("/VTKHDF/NumberOfConnectivityIds", {1}, Ints{4});
-    file.write("/VTKHDF/Points", {3, 3}, Doubles(9, 0));
-  }
-  EXPECT_THAT(error(), HasSubstr("Points is smaller"));
 }
 
 const std::string mesh_items = R"(
@@ -297,6 +292,8 @@ std::string document(const std::string& domain, const std::string& doctype = "")
          "<Xdmf Version=\"3.0\" xmlns:ns0=\"https://www.w3.org/2001/XInclude\"><Domain>" + domain +
          "</Domain></Xdmf>\n";
 }
+
+std::string grid_document(const std::string& items) { return document("<Grid Name=\"a\">" + items + "</Grid>"); }
 
 /// A scalar at the five points, with the value `first` at the first one.
 std::string attribute(const std::string& name, int first) {
@@ -320,10 +317,9 @@ double first_value(vtkDataSet& mesh, const char* name) {
 
 TEST(Xdmf, AGridInTheFileItself) {
   const TemporaryFolder folder;
-  const auto mesh =
-      read(folder, document("<Grid Name=\"a\" GridType=\"Uniform\">" + mesh_items + attribute("f", 7) + R"(
+  const auto mesh = read(folder, grid_document(mesh_items + attribute("f", 7) + R"(
     <Attribute Name="S" AttributeType="Tensor" Center="Cell"><DataItem Dimensions="2 9" Format="XML">
-      1 2 3 4 5 6 7 8 9  11 12 13 14 15 16 17 18 19</DataItem></Attribute></Grid>)"));
+      1 2 3 4 5 6 7 8 9  11 12 13 14 15 16 17 18 19</DataItem></Attribute>)"));
   EXPECT_EQ(mesh->GetNumberOfCells(), 2);
   EXPECT_EQ(mesh->GetCellType(1), VTK_TETRA);
   EXPECT_EQ(mesh->GetPoint(4)[2], 1);
@@ -444,36 +440,31 @@ TEST(Xdmf, MixedCellsOrderedMeshesAndBinaryFiles) {
 TEST(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
   const TemporaryFolder folder;
   const auto error = [&](const std::string& text) { return error_of([&] { read(folder, text); }); };
-  const std::string grid = "<Grid Name=\"a\">" + mesh_items + "</Grid>";
   const auto changed = [&](const std::string& from, const std::string& to) {
-    std::string text = document(grid);
-    return text.replace(text.find(from), from.size(), to);
+    return error(replaced_text(grid_document(mesh_items), from, to));
   };
-  EXPECT_THAT(error(document(grid).substr(0, 200)), HasSubstr("a.xdmf: is damaged"));
+  const auto with_array = [&](const std::string& item) {
+    return error(grid_document(mesh_items + "<Attribute Name=\"f\">" + item + "</Attribute>"));
+  };
+  EXPECT_THAT(error(grid_document(mesh_items).substr(0, 200)), HasSubstr("a.xdmf: is damaged"));
   EXPECT_THAT(error(document("")), HasSubstr("has no grid"));
-  EXPECT_THAT(error(changed("1 2 3 4</DataItem>", "1 2 3</DataItem>")), HasSubstr("has 7"));
-  EXPECT_THAT(error(changed("1 2 3 4</DataItem>", "1 2 3 9</DataItem>")), HasSubstr("point 9"));
-  EXPECT_THAT(error(changed("Tetrahedron", "Wurtzite")), HasSubstr("type wurtzite"));
-  EXPECT_THAT(error(changed("0 0 0  1 0 0", "0 0 0  1 0 x")), HasSubstr("no numbers"));
-  EXPECT_THAT(error(changed("Format=\"XML\">0 0", "Format=\"HDF\">none.h5:/x")), HasSubstr("none.h5: is missing"));
-  EXPECT_THAT(error(document("<Grid>" + mesh_items +
-                             "<Attribute Name=\"f\"><DataItem Format=\"XML\">1 2</DataItem>"
-                             "</Attribute></Grid>")),
-              HasSubstr("2 numbers for 5 points"));
-  EXPECT_THAT(error(document("<Grid>" + mesh_items + R"(<Attribute Name="f"><DataItem Reference="XML">
-    /Xdmf/Domain/Grid/Attribute/DataItem</DataItem></Attribute></Grid>)")),
+  EXPECT_THAT(changed("1 2 3 4</DataItem>", "1 2 3</DataItem>"), HasSubstr("has 7"));
+  EXPECT_THAT(changed("1 2 3 4</DataItem>", "1 2 3 9</DataItem>"), HasSubstr("point 9"));
+  EXPECT_THAT(changed("Tetrahedron", "Wurtzite"), HasSubstr("type wurtzite"));
+  EXPECT_THAT(changed("0 0 0  1 0 0", "0 0 0  1 0 x"), HasSubstr("no numbers"));
+  EXPECT_THAT(changed("Format=\"XML\">0 0", "Format=\"HDF\">none.h5:/x"), HasSubstr("none.h5: is missing"));
+  EXPECT_THAT(with_array("<DataItem Format=\"XML\">1 2</DataItem>"), HasSubstr("2 numbers for 5 points"));
+  EXPECT_THAT(with_array("<DataItem Reference=\"XML\">/Xdmf/Domain/Grid/Attribute/DataItem</DataItem>"),
               HasSubstr("refers to itself"));
   write_bytes(folder / "b.h5", "\x89HDF\r\n\x1a\n and no more");
-  EXPECT_THAT(error(changed("Format=\"XML\">0 0", "Format=\"HDF\">b.h5:/x")), HasSubstr("b.h5: is no HDF5"));
+  EXPECT_THAT(changed("Format=\"XML\">0 0", "Format=\"HDF\">b.h5:/x"), HasSubstr("b.h5: is no HDF5"));
 }
 
 TEST(Xdmf, BlocksThatShareTheirPointsAreNotTheSameMesh) {
   const TemporaryFolder folder;
   std::string grids;
   for (const std::string cell : {"0 1 2 3", "1 2 3 4"}) {
-    std::string items = mesh_items;
-    items.replace(items.find("2 4\""), 3, "1 4");
-    items.replace(items.find("0 1 2 3  1 2 3 4"), 16, cell);
+    const std::string items = replaced_text(replaced_text(mesh_items, "2 4\"", "1 4\""), "0 1 2 3  1 2 3 4", cell);
     grids += "<Grid Name=\"" + cell + "\">" + items + attribute("f", 7) + "</Grid>";
   }
   const auto mesh =
@@ -485,51 +476,48 @@ TEST(Xdmf, BlocksThatShareTheirPointsAreNotTheSameMesh) {
 TEST(Xdmf, PointsMayBeCountedFromOne) {
   const TemporaryFolder folder;
   const auto with = [](const std::string& type, const std::string& attributes, const std::string& cells) {
-    std::string items = mesh_items;
-    items.replace(items.find("Tetrahedron\""), 12, type + "\" " + attributes);
-    items.replace(items.find("0 1 2 3  1 2 3 4"), 16, cells);
-    return items.replace(items.find("\"2 4\""), 5, type == "Mixed" ? "\"10\"" : "\"2 4\"");
+    const std::string items =
+        replaced_text(replaced_text(mesh_items, "Tetrahedron\"", type + "\" " + attributes), "0 1 2 3  1 2 3 4", cells);
+    return grid_document(replaced_text(items, "\"2 4\"", type == "Mixed" ? "\"10\"" : "\"2 4\"") + attribute("f", 7));
   };
-  const auto grid = [&](const std::string& items) {
-    return document("<Grid Name=\"a\">" + items + attribute("f", 7) + "</Grid>");
-  };
-  for (const std::string& items : {with("Tetrahedron", "BaseOffset=\"1\"", "1 2 3 4  2 3 4 5"),
-                                   with("Mixed", "BaseOffset=\"1\"", "6 1 2 3 4  6 2 3 4 5")}) {
-    const auto mesh = read(folder, grid(items));
+  for (const std::string& text : {with("Tetrahedron", "BaseOffset=\"1\"", "1 2 3 4  2 3 4 5"),
+                                  with("Mixed", "BaseOffset=\"1\"", "6 1 2 3 4  6 2 3 4 5")}) {
+    const auto mesh = read(folder, text);
     ASSERT_EQ(mesh->GetNumberOfCells(), 2);
     EXPECT_EQ(mesh->GetCell(1)->GetPointId(3), 4);
     EXPECT_EQ(mesh->GetCell(0)->GetPointId(0), 0);
   }
-  const std::string ordered = grid(with("Tetrahedron", "Order=\"3 2 1 0\"", "0 1 2 3  1 2 3 4"));
+  const std::string ordered = with("Tetrahedron", "Order=\"3 2 1 0\"", "0 1 2 3  1 2 3 4");
   EXPECT_THAT(error_of([&] { read(folder, ordered); }), HasSubstr("order of points of their own"));
 }
 
 /// Numbers whose products are beyond all integers, or that do not fit each other.
 TEST(Xdmf, SizesThatDoNotFitAreErrors) {
   const TemporaryFolder folder;
-  const auto error = [&](const std::string& grid) {
-    return error_of([&] { read(folder, document("<Grid Name=\"a\">" + grid + "</Grid>")); });
+  const auto items = [](const std::vector<std::string>& lists) {
+    std::string text;
+    for (const std::string& list : lists) text += "<DataItem Format=\"XML\">" + list + "</DataItem>";
+    return text;
   };
-  const auto numbers = [](const std::string& list) { return "<DataItem Format=\"XML\">" + list + "</DataItem>"; };
-  const auto grid_of = [](const std::string& type, const std::string& size, const std::string& geometry,
-                          const std::string& items) {
+  const auto grid_of = [&](const std::string& type, const std::string& size, const std::string& geometry,
+                           const std::vector<std::string>& lists) {
     return "<Topology TopologyType=\"" + type + "\" Dimensions=\"" + size + "\"/><Geometry GeometryType=\"" + geometry +
-           "\">" + items + "</Geometry>";
+           "\">" + items(lists) + "</Geometry>";
   };
-  EXPECT_THAT(error(mesh_items + "<Attribute Name=\"f\"><DataItem ItemType=\"HyperSlab\" Dimensions=\"5\">" +
-                    numbers("0 17592186044416 1048577") + numbers("1 2 3 4 5") + "</DataItem></Attribute>"),
-              HasSubstr("a.xdmf: a DataItem is a HyperSlab beyond"));
-  EXPECT_THAT(error(grid_of("3DCoRectMesh", "1000000000 1000000000 1000000000", "Origin_DxDyDz",
-                            numbers("0 0 0") + numbers("1 1 1"))),
-              HasSubstr("senseless"));
-  EXPECT_THAT(error(grid_of("3DCoRectMesh", "2 2 2", "VxVyVz", numbers("5 6") + numbers("5 6") + numbers("5 6"))),
-              HasSubstr("type vxvyvz, which does not fit"));
-  EXPECT_THAT(error(grid_of("3DRectMesh", "2 2 2", "Origin_DxDyDz", numbers("5 6 7") + numbers("1 1 1"))),
-              HasSubstr("type origin_dxdydz, which does not fit"));
-  EXPECT_THAT(error(grid_of("3DRectMesh", "2 2 3", "VxVyVz", numbers("5 6") + numbers("5 6") + numbers("5 6"))),
-              HasSubstr("other numbers of coordinates"));
-  EXPECT_THAT(error(grid_of("3DSMesh", "2 2 2", "XYZ", numbers("0 0 0  1 0 0"))),
-              HasSubstr("another number of points"));
+  const std::string huge = "1000000000 1000000000 1000000000";
+  const std::pair<std::string, const char*> table[] = {
+      {mesh_items + "<Attribute Name=\"f\"><DataItem ItemType=\"HyperSlab\" Dimensions=\"5\">" +
+           items({"0 17592186044416 1048577", "1 2 3 4 5"}) + "</DataItem></Attribute>",
+       "a.xdmf: a DataItem is a HyperSlab beyond"},
+      {grid_of("3DCoRectMesh", huge, "Origin_DxDyDz", {"0 0 0", "1 1 1"}), "senseless"},
+      {grid_of("3DCoRectMesh", "2 2 2", "VxVyVz", {"5 6", "5 6", "5 6"}), "type vxvyvz, which does not fit"},
+      {grid_of("3DRectMesh", "2 2 2", "Origin_DxDyDz", {"5 6 7", "1 1 1"}), "type origin_dxdydz, which does not fit"},
+      {grid_of("3DRectMesh", "2 2 3", "VxVyVz", {"5 6", "5 6", "5 6"}), "other numbers of coordinates"},
+      {grid_of("3DSMesh", "2 2 2", "XYZ", {"0 0 0  1 0 0"}), "another number of points"}};
+  for (const auto& [grid, words] : table) {
+    const std::string text = grid_document(grid);
+    EXPECT_THAT(error_of([&] { read(folder, text); }), HasSubstr(words));
+  }
 }
 
 }  // namespace

@@ -2,9 +2,8 @@
 #include <nifti1.h>
 #include <nifti2.h>
 
-#include "base/process/progress.h"
+#include "tests/import/imported.h"
 #include "tests/import/voxel_support.h"
-#include "tools/import/import_file.h"
 #include "tools/import/lattice_files/lattice_files.h"
 
 namespace tensorray {
@@ -35,12 +34,6 @@ std::string file_of(const Header& header, const std::string& numbers) {
   return std::string(reinterpret_cast<const char*>(&header), sizeof header) + std::string(4, '\0') + numbers;
 }
 
-std::vector<float> fsl(const Matrix3d& t) {
-  std::vector<float> six;
-  for (const double c : {t(0, 0), t(0, 1), t(0, 2), t(1, 1), t(1, 2), t(2, 2)}) six.push_back(static_cast<float>(c));
-  return six;
-}
-
 /// The values of `components(index)`, volume by volume, as the format stores them.
 std::string volumes_of(const Vector3i& size, const std::function<std::vector<float>(const Vector3i&)>& components) {
   std::vector<float> numbers;
@@ -56,9 +49,7 @@ Matrix3d read_one(const nifti_1_header& header, const std::vector<float>& compon
   const Vector3i size(header.dim[1], header.dim[2], header.dim[3]);
   const test::TemporaryFile file("one.nii",
                                  file_of(header, volumes_of(size, [&](const Vector3i&) { return components; })));
-  const TensorGrid grid = test::tensors_of(open_nifti(file), order);
-  const Eigen::Matrix3f* tensor = test::voxel(grid, {0, 0, 0});
-  return tensor ? Matrix3d(tensor->cast<double>()) : Matrix3d(Matrix3d::Constant(NAN));
+  return test::first_tensor(test::tensors_of(open_nifti(file), order));
 }
 
 /// Oblique and anisotropic; the determinant is negative if `sign` is −1.
@@ -78,8 +69,7 @@ TEST(Nifti, MatricesAlongTwoAxesAreInTheAxesOfTheVoxelsAndItIsSaid) {
     const Affine3d transform = oblique(sign);
     nifti_1_header header = header_of({2, 3, 2}, 3, transform);
     header.dim[0] = 5, header.dim[5] = 3;
-    std::vector<float> columns;
-    for (int i = 0; i < 9; ++i) columns.push_back(static_cast<float>(T(i % 3, i / 3)));
+    const std::vector<float> columns = test::rows(T.transpose());
     const test::TemporaryFile file("five.nii",
                                    file_of(header, volumes_of({2, 3, 2}, [&](const Vector3i&) { return columns; })));
     const Matrix3d F = axes_of(ComponentFrame::voxels, transform.linear());
@@ -120,7 +110,9 @@ TEST(Nifti, ComponentsOfFslTurnWithTheImageAndItsConvention) {
   // In both cases FSL's first axis makes the frame left-handed.
   const Matrix3d frame = turn * flip_x, expected = frame * t * frame.transpose();
   for (const double sign : {-1.0, 1.0})
-    EXPECT_LT((read_one(header_of({2, 2, 2}, 6, oblique(sign)), fsl(t), TensorOrder::fsl) - expected).norm(), 1e-5);
+    EXPECT_LT(
+        (read_one(header_of({2, 2, 2}, 6, oblique(sign)), test::upper_triangle(t), TensorOrder::fsl) - expected).norm(),
+        1e-5);
 }
 
 /// A transform stored from left to right or from right to left, the six components of one tensor in the order, and the
@@ -160,16 +152,13 @@ TEST(Nifti, TheFrameAndTheOrderAreTwoThings) {
     const bool is_lower = one.by_intent || one.order == Order::lower_triangle;
     const test::TemporaryFile file("frame.nii", file_of(header, test::bytes_of(is_lower ? lower : upper)));
     ImportSettings settings;
-    settings.files = {file};
     settings.order = one.order;
     settings.frame = one.frame;
-    ImportReport report;
-    const TensorGrid grid = import_tensors(settings, Progress(), report);
+    const auto [grid, report] = imported(file, settings);
     const double xz = one.frame == Frame::lps ? -one.sign : one.sign, yz = one.frame == Frame::lps ? -1 : 1;
-    Matrix3d expected;
-    expected << 1, 0.2 * one.sign, 0.1 * xz, 0.2 * one.sign, 0.6, 0.05 * yz, 0.1 * xz, 0.05 * yz, 0.3;
     SCOPED_TRACE(one.name);
-    test::expect_near(expected, test::voxel(grid, {0, 0, 0}));
+    test::expect_near(test::symmetric({1, 0.2 * one.sign, 0.1 * xz, 0.6, 0.05 * yz, 0.3}),
+                      test::voxel(grid, {0, 0, 0}));
     EXPECT_EQ(!report.lattice->notes.empty(), one.by_intent && !one.frame);
   }
 }
@@ -186,8 +175,7 @@ TEST(Nifti, FilesWithoutAnOrientationAreTakenAsFslTakesAnalyze) {
   ASSERT_EQ(report.notes.size(), 1u);
   EXPECT_NE(report.notes[0].find("sform"), std::string::npos);
   // FSL does not flip such an image: the components are in the axes of the voxels, of which the first one points left.
-  test::expect_near((Matrix3d() << 1, -0.2, -0.1, -0.2, 0.6, 0.05, -0.1, 0.05, 0.3).finished(),
-                    test::voxel(grid, {1, 0, 0}));
+  test::expect_near(test::symmetric({1, -0.2, -0.1, 0.6, 0.05, 0.3}), test::voxel(grid, {1, 0, 0}));
 }
 
 /// Of nine components and of vectors, nothing tells the axes; no tensor can be made of eigenvectors.
@@ -242,10 +230,7 @@ TEST(Nifti, IntegersOfTheOtherByteOrderAndTwoFilesAreRead) {
   header.bitpix = 16;
   header.vox_offset = 0;
   std::memcpy(header.magic, "ni1", 4);
-  const auto swap = [](auto& number) {
-    auto* bytes = reinterpret_cast<char*>(&number);
-    std::reverse(bytes, bytes + sizeof number);
-  };
+  const auto swap = [](auto& number) { number = test::swapped(number); };
   for (short& extent : header.dim) swap(extent);
   for (float& size : header.pixdim) swap(size);
   for (float* row : {header.srow_x, header.srow_y, header.srow_z})
@@ -255,16 +240,14 @@ TEST(Nifti, IntegersOfTheOtherByteOrderAndTwoFilesAreRead) {
   for (std::int16_t& number : numbers) swap(number);
   const test::TemporaryFile head("pair.hdr", file_of(header, "")), image("pair.img", test::bytes_of(numbers));
   for (const auto* const path : {&head, &image}) {
-    const std::filesystem::path& either = *path;
-    const TensorGrid grid = test::tensors_of(open_nifti(either), TensorOrder::fsl);
+    const TensorGrid grid = test::tensors_of(open_nifti(*path), TensorOrder::fsl);
     test::expect_near(Vector3d(258, 2, 3).asDiagonal(), test::voxel(grid, {1, 0, 0}));
     ImportSettings settings;
-    settings.files = {either};
+    settings.files = {*path};
     settings.order = TensorOrder::fsl;
     settings.frame = ComponentFrame::voxels;
     EXPECT_EQ(time_steps(settings), 1);
-    ImportReport report;
-    EXPECT_EQ(import_tensors(settings, Progress(), report).active_voxels(), 2u);
+    EXPECT_EQ(imported(settings).voxels(), 2u);
   }
   std::filesystem::remove(image);
   test::expect_error([&] { open_nifti(head); }, {"pair.hdr", ".img"});

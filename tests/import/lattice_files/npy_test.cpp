@@ -58,13 +58,6 @@ void expect_field(const std::filesystem::path& path, const Vector3i& size) {
   EXPECT_EQ(wrong, 0) << path;
 }
 
-template <class Number>
-Number swapped(Number number) {
-  auto* bytes = reinterpret_cast<char*>(&number);
-  std::reverse(bytes, bytes + sizeof number);
-  return number;
-}
-
 const Vector3i size(4, 3, 19);
 const std::vector<std::size_t> shape = {19, 3, 4, 3, 3};
 
@@ -79,13 +72,13 @@ TEST(Npy, EveryPrecisionByteOrderAndArrangementIsRead) {
     };
     expect(header_of("<f4", fortran, shape) + numbers_of<float>(size, fortran, as_float), size);
     expect(header_of(">f4", fortran, shape, 2) +
-               numbers_of<float>(size, fortran, [&](double value) { return swapped(as_float(value)); }),
+               numbers_of<float>(size, fortran, [&](double value) { return test::swapped(as_float(value)); }),
            size);
     expect(header_of("<f8", fortran, shape, 3) + numbers_of<double>(size, fortran, [](double v) { return v; }), size);
-    expect(header_of(">f8", fortran, shape) + numbers_of<double>(size, fortran, swapped<double>), size);
+    expect(header_of(">f8", fortran, shape) + numbers_of<double>(size, fortran, test::swapped<double>), size);
     expect(header_of("<f2", fortran, {2, 2, 4, 3, 3}) + numbers_of<std::uint16_t>(small, fortran, half), small);
     expect(header_of(">f2", fortran, {2, 2, 4, 3, 3}) +
-               numbers_of<std::uint16_t>(small, fortran, [&](double value) { return swapped(half(value)); }),
+               numbers_of<std::uint16_t>(small, fortran, [&](double value) { return test::swapped(half(value)); }),
            small);
   }
 }
@@ -95,7 +88,7 @@ TEST(Npy, SixAskForTheirOrderAndThreeAreAVector) {
   const test::TemporaryFile file("six.npy", header_of("<f8", false, {1, 1, 1, 6}) + test::bytes_of(six));
   test::expect_error([&] { test::tensors_of(open_npy(file)); }, {"--order"});
   const TensorGrid grid = test::tensors_of(open_npy(file), TensorOrder::voigt);
-  test::expect_near((Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished(), test::voxel(grid, {0, 0, 0}));
+  test::expect_near(test::symmetric({11, 12, 13, 22, 23, 33}), test::voxel(grid, {0, 0, 0}));
 
   const std::vector<double> vectors = {0, 0, 0, 5, 0, 0};  // v = (5 y, 0, 0)
   write_bytes(file, header_of("<f8", false, {1, 2, 1, 3}) + test::bytes_of(vectors));
@@ -111,23 +104,22 @@ TEST(Npy, WrongFilesAreErrorsOfOneLine) {
   const auto expect = [](const std::string& bytes, const std::vector<std::string>& words) {
     test::refuses(open_npy, "wrong.npy", bytes, words);
   };
-  const auto header = [](const std::string& descr, const std::vector<std::size_t>& extents) {
-    return header_of(descr, false, extents);
-  };
+  using Shape = std::vector<std::size_t>;
+  const auto floats = [](const Shape& extents) { return header_of("<f4", false, extents); };
+  const Shape good{2, 2, 2, 3, 3};
   test::expect_error([] { open_npy("absent.npy"); }, {"absent.npy", "no such file"});
   expect("", {"not a .npy"});
   expect("NRRD0004\ntype: float\n", {"not a .npy"});
-  expect(header("<f4", {2, 2, 2, 3, 3}).substr(0, 40), {"cut off"});
-  expect(header("<f4", {2, 2, 2, 3, 3}) + numbers.substr(1), {"288 bytes", "287", "cut off"});
-  expect(header("<f4", {2, 2, 2, 3, 3}) + numbers + "1", {"several arrays"});
-  expect(header("<f4", {2, 2, 2, 9, 1}) + numbers, {"shape is (2, 2, 2, 9, 1)", "(nz, ny, nx, 3, 3)"});
-  expect(header("<f4", {2, 2, 18}) + numbers, {"shape is (2, 2, 18)"});
-  expect(header("<f4", {2, 2, 2, 7}) + numbers, {"shape is (2, 2, 2, 7)"});
-  expect(header("<f4", {0, 2, 2, 3, 3}), {"empty"});
-  expect(header("<i4", {2, 2, 2, 3, 3}) + numbers, {"astype"});
-  expect(header("|O", {2, 2, 2, 3, 3}) + numbers, {"astype"});
-  expect(header("<f4", {2147483647, 2147483647, 2147483647, 3, 3}) + numbers, {"cut off"});
-  expect(header("<f4", {99999999999, 2, 2, 3, 3}) + numbers, {"damaged"});
+  expect(floats(good).substr(0, 40), {"cut off"});
+  expect(floats(good) + numbers.substr(1), {"288 bytes", "287", "cut off"});
+  expect(floats(good) + numbers + "1", {"several arrays"});
+  expect(floats({2, 2, 2, 9, 1}) + numbers, {"shape is (2, 2, 2, 9, 1)", "(nz, ny, nx, 3, 3)"});
+  expect(floats({2, 2, 18}) + numbers, {"shape is (2, 2, 18)"});
+  expect(floats({2, 2, 2, 7}) + numbers, {"shape is (2, 2, 2, 7)"});
+  expect(floats({0, 2, 2, 3, 3}), {"empty"});
+  for (const char* type : {"<i4", "|O"}) expect(header_of(type, false, good) + numbers, {"astype"});
+  expect(floats({2147483647, 2147483647, 2147483647, 3, 3}) + numbers, {"cut off"});
+  expect(floats({99999999999, 2, 2, 3, 3}) + numbers, {"damaged"});
 }
 
 const Vector3i lattice_size(3, 4, 2);
@@ -188,7 +180,7 @@ TEST(Mrtrix, EveryLayoutAndTypeGivesTheSameTensors) {
         ASSERT_EQ(grid.active_voxels(), 24u);
         test::for_each_voxel(grid, [&](const Vector3i& i, const Matrix3d& tensor) {
           const auto v = [&](int c) { return value_at(i, c); };
-          const Matrix3d expected = (Matrix3d() << v(0), v(3), v(4), v(3), v(1), v(5), v(4), v(5), v(2)).finished();
+          const Matrix3d expected = test::symmetric({v(0), v(3), v(4), v(1), v(5), v(2)});
           EXPECT_EQ(tensor, expected) << layout << ' ' << datatype << ' ' << i.transpose();
         });
       }
@@ -211,7 +203,7 @@ TEST(Mrtrix, TheUserGivesAnotherOrderWithItsAxes) {
   const test::TemporaryFile file("a.mif", mrtrix_file("+0,+1,+2,+3", "Float32LE", 6,
                                                       "transform: -1,0,0,0\ntransform: 0,1,0,0\ntransform: 0,0,1,0\n"));
   const auto v = [](int c) { return value_at({1, 1, 1}, c); };
-  const Matrix3d fsl = (Matrix3d() << v(0), -v(1), -v(2), -v(1), v(3), v(4), -v(2), v(4), v(5)).finished();
+  const Matrix3d fsl = test::symmetric({v(0), -v(1), -v(2), v(3), v(4), v(5)});
   test::expect_near(fsl, test::voxel(test::tensors_of(open_mrtrix(file), TensorOrder::fsl), {1, 1, 1}));
 }
 

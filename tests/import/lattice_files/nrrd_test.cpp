@@ -20,14 +20,6 @@ std::string header_of(const std::string& kind, int components, const Vector3i& s
       space, components, size.x(), size.y(), size.z(), kind, fields);
 }
 
-std::vector<float> floats(std::initializer_list<double> numbers) { return {numbers.begin(), numbers.end()}; }
-
-std::vector<float> six(const Matrix3d& t) { return floats({t(0, 0), t(0, 1), t(0, 2), t(1, 1), t(1, 2), t(2, 2)}); }
-
-std::vector<float> nine(const Matrix3d& t) {
-  return floats({t(0, 0), t(0, 1), t(0, 2), t(1, 0), t(1, 1), t(1, 2), t(2, 0), t(2, 1), t(2, 2)});
-}
-
 /// The header line of a measurement frame. Its vectors are the columns of `frame`.
 std::string measurement_frame(const Matrix3d& frame) {
   const auto vector = [&](int i) { return fmt::format("({},{},{})", frame(0, i), frame(1, i), frame(2, i)); };
@@ -36,28 +28,38 @@ std::string measurement_frame(const Matrix3d& frame) {
 
 Matrix3d read_one(const std::string& header, const std::vector<float>& components) {
   const test::TemporaryFile file("one.nrrd", header + test::bytes_of(components));
-  const TensorGrid grid = test::tensors_of(open_nrrd(file));
-  const Eigen::Matrix3f* tensor = test::voxel(grid, {0, 0, 0});
-  return tensor ? Matrix3d(tensor->cast<double>()) : Matrix3d(Matrix3d::Constant(NAN));
+  return test::first_tensor(test::tensors_of(open_nrrd(file)));
 }
 
 TEST(Nrrd, EachKindHasItsComponentsOrderAndMask) {
   const Matrix3d symmetric = test::symmetric_tensor(), general = test::general_tensor();
-  const auto with_mask = [](double mask, std::vector<float> components) {
-    components.insert(components.begin(), static_cast<float>(mask));
-    return components;
+  struct Row {
+    const char* kind;
+    std::optional<float> mask;
+    const Matrix3d& tensor;
+    bool is_full = false;
   };
-  const auto header = [](const std::string& kind, int components) {
-    return header_of(kind, components, {1, 1, 1}, oblique_fields);
-  };
-  EXPECT_LT((read_one(header("3D-symmetric-matrix", 6), six(symmetric)) - symmetric).norm(), 1e-6);
-  EXPECT_LT((read_one(header("3D-masked-symmetric-matrix", 7), with_mask(1, six(symmetric))) - symmetric).norm(), 1e-6);
-  EXPECT_LT((read_one(header("???", 7), with_mask(1, six(symmetric))) - symmetric).norm(), 1e-6);
-  EXPECT_LT((read_one(header("3D-matrix", 9), nine(general)) - general).norm(), 1e-6);
-  EXPECT_LT((read_one(header("3D-masked-matrix", 10), with_mask(1, nine(general))) - general).norm(), 1e-6);
-  EXPECT_TRUE(read_one(header("3D-masked-symmetric-matrix", 7), with_mask(0, six(symmetric))).hasNaN());
-  EXPECT_TRUE(read_one(header("3D-masked-matrix", 10), with_mask(0, nine(general))).hasNaN());
-  test::expect_error([&] { read_one(header("list", 6), six(symmetric)); }, {"--order"});
+  for (const Row& row : {Row{"3D-symmetric-matrix", {}, symmetric},
+                         {"3D-masked-symmetric-matrix", 1, symmetric},
+                         {"3D-masked-symmetric-matrix", 0, symmetric},
+                         {"???", 1, symmetric},
+                         {"3D-matrix", {}, general, true},
+                         {"3D-masked-matrix", 1, general, true},
+                         {"3D-masked-matrix", 0, general, true}}) {
+    std::vector<float> components = row.is_full ? test::rows(row.tensor) : test::upper_triangle(row.tensor);
+    if (row.mask) components.insert(components.begin(), *row.mask);
+    const Matrix3d found =
+        read_one(header_of(row.kind, static_cast<int>(components.size()), {1, 1, 1}, oblique_fields), components);
+    if (row.mask == 0)
+      EXPECT_TRUE(found.hasNaN()) << row.kind;
+    else
+      EXPECT_LT((found - row.tensor).norm(), 1e-6) << row.kind;
+  }
+  test::expect_error(
+      [&] {
+        read_one(header_of("list", 6, {1, 1, 1}, oblique_fields), test::upper_triangle(symmetric));
+      },
+      {"--order"});
 }
 
 TEST(Nrrd, AnatomicalSpacesAreTurnedToRasWithTheMeasurementFrame) {
@@ -71,7 +73,7 @@ TEST(Nrrd, AnatomicalSpacesAreTurnedToRasWithTheMeasurementFrame) {
                                                                 {"scanner-xyz", {1, 1, 1}}};
   for (const auto& [space, signs] : spaces) {
     const test::TemporaryFile file("space.nrrd",
-                                   header_of("3D-matrix", 9, {1, 1, 1}, fields, space) + test::bytes_of(nine(t)));
+                                   header_of("3D-matrix", 9, {1, 1, 1}, fields, space) + test::bytes_of(test::rows(t)));
     const TensorGrid grid = test::tensors_of(open_nrrd(file));
     const Matrix3d turn = signs.asDiagonal();
     EXPECT_LT((grid.to_world.linear() - turn * directions).norm(), 1e-9) << space;
@@ -96,7 +98,7 @@ TEST(Nrrd, ComponentsMayStandAnywhereAmongTheAxes) {
   EXPECT_EQ(grid.active_voxels(), 60u);
   test::for_each_voxel(grid, [](const Vector3i& i, const Matrix3d& tensor) {
     const double n = i.x() + 3 * i.y() + 6 * i.z();
-    const Matrix3d expected = (Matrix3d() << 100, 200, 300, 200, 400, 500, 300, 500, 600).finished();
+    const Matrix3d expected = test::symmetric({100, 200, 300, 400, 500, 600});
     EXPECT_EQ(tensor, Matrix3d(expected + Matrix3d::Constant(n)));
   });
 }
@@ -122,7 +124,7 @@ TEST(Nrrd, TextDetachedDataAndIntegersAreRead) {
   const auto expect = [](const std::filesystem::path& path) {
     const TensorGrid grid = test::tensors_of(open_nrrd(path));
     EXPECT_EQ(grid.active_voxels(), 1u);  // Exactly zero is background.
-    test::expect_near((Matrix3d() << 1, 2, 3, 2, 4, 5, 3, 5, -6).finished(), test::voxel(grid, {0, 0, 1}));
+    test::expect_near(test::symmetric({1, 2, 3, 4, 5, -6}), test::voxel(grid, {0, 0, 1}));
   };
   const test::TemporaryFile text("text.nrrd", fields + "encoding: ascii\n\n0 0 0 0 0 0\n1 2 3 4 5 -6\n");
   expect(text);
@@ -147,19 +149,21 @@ TEST(Nrrd, WrongFilesAreErrorsOfOneLine) {
   expect("1 2 3\n4 5 6\n", {"not a NRRD"});
   expect("NRRD0005\ntype: float\ndimension: 4\n", {"damaged"});
   expect("NRRD0005\ntype: colour\n\n", {"damaged"});
-  expect(header_of("3D-matrix", 9, {2, 2, 2}, oblique_fields) + numbers.substr(200), {"cut off"});
-  expect(header_of("3D-matrix", 9, {2, 2, 2}, oblique_fields) + numbers.substr(1), {"cut off"});
-  expect(header_of("3D-matrix", 9, {20000, 20000, 20000}, oblique_fields) + numbers, {"cut off"});
-  expect(header_of("3D-matrix", 9, {2, 2, 0}, oblique_fields) + numbers, {"damaged"});
-  expect(header_of("3D-matrix", 6, {2, 2, 2}, oblique_fields) + numbers, {});
-  expect(header_of("list", 8, {2, 2, 2}, oblique_fields) + numbers, {"8 components"});
-  expect(header_of("3D-matrix", 9, {2, 2, 2}, "space directions: none (1,0,0) (2,0,0) (0,0,1)\n") + numbers,
-         {"space directions", "inverted"});
-  expect(
-      header_of("3D-matrix", 9, {2, 2, 2}, oblique_fields + "measurement frame: (1,0,0) (0,0,0) (0,0,1)\n") + numbers,
-      {"measurement frame"});
-  expect(header_of("3D-matrix", 9, {2, 2, 2}, oblique_fields + "data file: s%s%d 1 9 1\n"), {"several files"});
-  expect(header_of("3D-matrix", 9, {2, 2, 2}, oblique_fields + "Data File: -\n"), {"standard input"});
+  const auto sized = [](const Vector3i& size, const std::string& fields = oblique_fields) {
+    return header_of("3D-matrix", 9, size, fields);
+  };
+  const Vector3i two(2, 2, 2);
+  expect(sized(two) + numbers.substr(200), {"cut off"});
+  expect(sized(two) + numbers.substr(1), {"cut off"});
+  expect(sized({20000, 20000, 20000}) + numbers, {"cut off"});
+  expect(sized({2, 2, 0}) + numbers, {"damaged"});
+  expect(header_of("3D-matrix", 6, two, oblique_fields) + numbers, {});
+  expect(header_of("list", 8, two, oblique_fields) + numbers, {"8 components"});
+  expect(sized(two, "space directions: none (1,0,0) (2,0,0) (0,0,1)\n") + numbers, {"space directions", "inverted"});
+  const std::string frame = "measurement frame: (1,0,0) (0,0,0) (0,0,1)\n";
+  expect(sized(two, oblique_fields + frame) + numbers, {"measurement frame"});
+  expect(sized(two, oblique_fields + "data file: s%s%d 1 9 1\n"), {"several files"});
+  expect(sized(two, oblique_fields + "Data File: -\n"), {"standard input"});
   expect("NRRD0005\ntype: float\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: little\n\n" + numbers, {"axes"});
 }
 
@@ -168,21 +172,17 @@ TEST(Nrrd, TheFrameOfComponentsIsGivenWhereTheFileDoesNotStateIt) {
   const std::string lps = "left-posterior-superior",
                     directions = "space directions: none (2,0,0) (0,-2,0) (0,0,3)\n";  // in RAS: (−2, 0, 0) (0, 2, 0)
   const auto take = [&](const std::string& header) {
-    const test::TemporaryFile file("frame.nrrd", header + test::bytes_of(six(t)));
+    const test::TemporaryFile file("frame.nrrd", header + test::bytes_of(test::upper_triangle(t)));
     Lattice lattice = open_nrrd(file);
     take_frame(lattice, ComponentFrame::voxels);
     return test::tensors_of(lattice);
   };
-  const std::string start = header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions, lps);
-  test::expect_near(flip * t * flip, test::voxel(take(start), {0, 0, 0}));
-  const std::string stated =
-      header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions + measurement_frame(Matrix3d::Identity()), lps);
-  test::expect_error([&] { take(stated); }, {"--frame"});
-  test::expect_error(
-      [&] {
-        take(header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions, "scanner-xyz"));
-      },
-      {"--frame"});
+  const auto header = [&](const std::string& fields, const std::string& space) {
+    return header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions + fields, space);
+  };
+  test::expect_near(flip * t * flip, test::voxel(take(header("", lps)), {0, 0, 0}));
+  for (const std::string& stated : {header(measurement_frame(Matrix3d::Identity()), lps), header("", "scanner-xyz")})
+    test::expect_error([&] { take(stated); }, {"--frame"});
 }
 
 /// A header of single-precision numbers; `fields` are further lines.
@@ -194,17 +194,10 @@ std::string header_of(int channels, const Vector3i& size, const std::string& fie
       fields, size.x(), size.y(), size.z(), channels, type, file);
 }
 
-std::vector<float> upper_triangle(const Matrix3d& t, double factor = 1) {
-  std::vector<float> numbers;
-  for (const double c : {t(0, 0), t(0, 1), t(0, 2), t(1, 1), t(1, 2), t(2, 2)})
-    numbers.push_back(static_cast<float>(factor * c));
-  return numbers;
-}
-
 /// 2 × 1 × 1 voxels: a tensor, and its half.
 std::vector<float> two_voxels() {
-  std::vector<float> numbers = upper_triangle(test::symmetric_tensor());
-  for (const float number : upper_triangle(test::symmetric_tensor(), 0.5)) numbers.push_back(number);
+  std::vector<float> numbers = test::upper_triangle(test::symmetric_tensor());
+  for (const float number : test::upper_triangle(0.5 * test::symmetric_tensor())) numbers.push_back(number);
   return numbers;
 }
 

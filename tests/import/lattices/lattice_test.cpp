@@ -8,13 +8,11 @@
 #include <vtk_exodusII.h>
 #include <zlib.h>
 
-#include "base/process/progress.h"
+#include "tests/import/imported.h"
 #include "tests/import/mesh_files.h"
-#include "tests/import/mesh_fixtures.h"
 #include "tests/import/openfoam_case.h"
 #include "tests/import/voxel_support.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/import_file.h"
 #include "tools/import/lattices/tensor_order.h"
 #include "tools/import/meshes/mesh_tensors.h"
 #include "tools/import/vtk_source/vtk_source.h"
@@ -49,9 +47,22 @@ Matrix3d tensor_at(const Vector3i& index) {
   return test::general_tensor() + Vector3d(1, 100, 10000).dot(index.cast<double>()) * Matrix3d::Ones();
 }
 
+/// Blocks are ordered, and only those with active voxels are there: those for which `is_there` holds.
+void expect_tensors_of(const TensorGrid& grid, const std::function<bool(const Vector3i& block)>& is_there) {
+  for (std::size_t i = 0; i < grid.blocks.size(); ++i) {
+    const Vector3i origin = grid.blocks[i].origin;
+    EXPECT_TRUE(is_there(origin / 8) && grid.blocks[i].active.any());
+    if (i == 0) continue;
+    const Vector3i before = grid.blocks[i - 1].origin;
+    EXPECT_TRUE(std::lexicographical_compare(before.begin(), before.end(), origin.begin(), origin.end()));
+  }
+  test::for_each_voxel(grid, [](const Vector3i& index, const Matrix3d& tensor) {
+    EXPECT_EQ(tensor, tensor_at(index).cast<float>().cast<double>());
+  });
+}
+
 TEST(Lattice, EveryVoxelKeepsItsTensorAndPlace) {
-  const Vector3i size(11, 17, 9);
-  Lattice lattice = lattice_of(size, [](const Vector3i& index) { return full(tensor_at(index)); });
+  Lattice lattice = lattice_of({11, 17, 9}, [](const Vector3i& index) { return full(tensor_at(index)); });
   lattice.to_world.translate(Vector3d(3, 4, 5)).scale(0.5);
   LatticeReport report;
   const TensorGrid grid = tensors_of(lattice, {}, report);
@@ -60,33 +71,15 @@ TEST(Lattice, EveryVoxelKeepsItsTensorAndPlace) {
   EXPECT_EQ(grid.active_voxels(), report.voxels);
   EXPECT_EQ(grid.to_world.matrix(), lattice.to_world.matrix());
   EXPECT_EQ(grid.blocks.size(), 2u * 3 * 2);
-  test::for_each_voxel(grid, [](const Vector3i& index, const Matrix3d& tensor) {
-    EXPECT_EQ(tensor, tensor_at(index).cast<float>().cast<double>());
-  });
-}
-
-TEST(Lattice, BlocksAreOrderedAndOnlyThoseWithActiveVoxels) {
-  Lattice lattice = lattice_of({40, 33, 29}, [](const Vector3i& index) {
-    const Vector3i block = index / 8;
-    const bool active = (block.x() * 7 + block.y() * 3 + block.z()) % 4 == 1;
-    return full(active ? tensor_at(index) : Matrix3d::Zero());
-  });
+  expect_tensors_of(grid, [](const Vector3i&) { return true; });
+  const auto some = [](const Vector3i& block) { return (block.x() * 7 + block.y() * 3 + block.z()) % 4 == 1; };
+  lattice = lattice_of(
+      {40, 33, 29}, [&](const Vector3i& index) { return full(some(index / 8) ? tensor_at(index) : Matrix3d::Zero()); });
   lattice.zero_is_background = true;
-  LatticeReport report;
-  const TensorGrid grid = tensors_of(lattice, {}, report);
+  const TensorGrid part = tensors_of(lattice, {}, report);
   EXPECT_EQ(report.active + report.background, report.voxels);
-  EXPECT_EQ(grid.active_voxels(), report.active);
-  for (std::size_t i = 0; i < grid.blocks.size(); ++i) {
-    const Vector3i origin = grid.blocks[i].origin, block = origin / 8;
-    EXPECT_EQ((block.x() * 7 + block.y() * 3 + block.z()) % 4, 1);
-    EXPECT_TRUE(grid.blocks[i].active.any());
-    if (i == 0) continue;
-    const Vector3i before = grid.blocks[i - 1].origin;
-    EXPECT_TRUE(std::lexicographical_compare(before.begin(), before.end(), origin.begin(), origin.end()));
-  }
-  test::for_each_voxel(grid, [](const Vector3i& index, const Matrix3d& tensor) {
-    EXPECT_EQ(tensor, tensor_at(index).cast<float>().cast<double>());
-  });
+  EXPECT_EQ(part.active_voxels(), report.active);
+  expect_tensors_of(part, some);
 }
 
 TEST(Lattice, SymmetricTensorsStaySymmetricWhenTurned) {
@@ -119,7 +112,7 @@ TEST(Lattice, MaskedZeroAndNonFiniteVoxelsAreInactive) {
   EXPECT_EQ(report.active, 2u);
   EXPECT_EQ(report.background, 4u);
   EXPECT_EQ(report.non_finite, 3u);
-  test::expect_near((Matrix3d() << 1, 2, 3, 2, 4, 5, 3, 5, 6).finished(), test::voxel(grid, {0, 0, 0}));
+  test::expect_near(test::symmetric({1, 2, 3, 4, 5, 6}), test::voxel(grid, {0, 0, 0}));
   EXPECT_NE(test::voxel(grid, {2, 0, 0}), nullptr);
   EXPECT_EQ(grid.blocks.front().values[TensorBlock::offset(1, 0, 0)], Eigen::Matrix3f::Zero());
 }
@@ -128,7 +121,7 @@ TEST(Lattice, OfMoreThanNineComponentsTheFirstSixAreTheTensor) {
   const Lattice lattice = lattice_of(
       {1, 1, 1}, [](const Vector3i&) { return std::vector<double>{11, 22, 33, 12, 23, 13, 99, NAN, 99, 99}; });
   const TensorGrid grid = test::tensors_of(lattice, TensorOrder::vtk);
-  test::expect_near((Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished(), test::voxel(grid, {0, 0, 0}));
+  test::expect_near(test::symmetric({11, 12, 13, 22, 23, 33}), test::voxel(grid, {0, 0, 0}));
 }
 
 TEST(Lattice, WrongNumbersOfComponentsAndAMissingOrderAreErrors) {
@@ -216,17 +209,9 @@ TEST(TensorOrder, EachOrderPutsComponentsInTheirPlaces) {
 /// Imports a file whose tensor is the same everywhere. @return that tensor.
 Matrix3d tensor_of_file(const std::filesystem::path& file, const std::string& array,
                         std::optional<TensorOrder> order = {}, Take take = Take::tensor) {
-  ImportSettings settings;
-  settings.files = {file};
-  settings.array = array;
+  ImportSettings settings = array_settings(array, take);
   settings.order = order;
-  settings.take = take;
-  ImportReport report;
-  const TensorGrid grid = import_tensors(settings, Progress(), report);
-  Matrix3d tensor = Matrix3d::Constant(-1);
-  for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& value) { tensor = value; });
-  for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& value) { EXPECT_LT((value - tensor).norm(), 1e-6); });
-  return tensor;
+  return imported(file, settings).tensor(1e-6);
 }
 
 void refuses(const std::filesystem::path& file, const std::string& array, std::optional<TensorOrder> order,
@@ -235,11 +220,7 @@ void refuses(const std::filesystem::path& file, const std::string& array, std::o
   EXPECT_THAT(import, ThrowsMessage<std::invalid_argument>(HasSubstr(part))) << file;
 }
 
-Matrix3d expected() {
-  Matrix3d tensor;
-  tensor << 1, 0.2, 0.3, 0.2, 2, 0.4, 0.3, 0.4, 3;
-  return tensor;
-}
+Matrix3d expected() { return test::symmetric({1, 0.2, 0.3, 2, 0.4, 3}); }
 
 /// Expects the tensor `expected`, unless another is given.
 void expect_tensor(const std::filesystem::path& file, const std::string& array, std::optional<TensorOrder> order = {},
@@ -299,30 +280,32 @@ void write_exodus(const std::filesystem::path& path, const std::vector<std::stri
   ex_put_block(file, EX_ELEM_BLOCK, 1, "HEX8", 1, 8, 0, 0, 0);
   const int corners[] = {1, 2, 3, 4, 5, 6, 7, 8};
   ex_put_conn(file, EX_ELEM_BLOCK, 1, corners, nullptr, nullptr);
-  const int count = static_cast<int>(names.size());
-  ex_put_variable_param(file, EX_ELEM_BLOCK, count);
+  ex_put_variable_param(file, EX_ELEM_BLOCK, static_cast<int>(names.size()));
   const double time = 0;
   ex_put_time(file, 1, &time);
-  for (int i = 0; i < count; ++i) {
-    ex_put_variable_name(file, EX_ELEM_BLOCK, i + 1, names[static_cast<std::size_t>(i)].c_str());
-    ex_put_var(file, 1, EX_ELEM_BLOCK, i + 1, 1, 1, &values[static_cast<std::size_t>(i)]);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    ex_put_variable_name(file, EX_ELEM_BLOCK, static_cast<int>(i) + 1, names[i].c_str());
+    ex_put_var(file, 1, EX_ELEM_BLOCK, static_cast<int>(i) + 1, 1, 1, &values[i]);
   }
   ex_close(file);
+}
+
+/// "stress_xx" and so on.
+std::vector<std::string> stresses(const std::vector<std::string>& entries) {
+  std::vector<std::string> names;
+  for (const std::string& entry : entries) names.push_back("stress_" + entry);
+  return names;
 }
 
 TEST(ComponentNames, VariablesOfExodusKeepTheirNames) {
   const TemporaryFolder folder;
   const std::filesystem::path six = folder / "six.e", nine = folder / "nine.e";
-  write_exodus(six, {"stress_xx", "stress_xy", "stress_xz", "stress_yy", "stress_yz", "stress_zz"},
-               {1, 0.2, 0.3, 2, 0.4, 3});
+  write_exodus(six, stresses({"xx", "xy", "xz", "yy", "yz", "zz"}), {1, 0.2, 0.3, 2, 0.4, 3});
   expect_tensor(six, "stress_xx,stress_yy,stress_zz,stress_xy,stress_yz,stress_xz");
   expect_tensor(six, "stress_xx,stress_xy,stress_xz,stress_yy,stress_yz,stress_zz");
-  write_exodus(nine,
-               {"stress_xx", "stress_xy", "stress_xz", "stress_yx", "stress_yy", "stress_yz", "stress_zx", "stress_zy",
-                "stress_zz"},
-               {1, 2, 3, 4, 5, 6, 7, 8, 9});
+  write_exodus(nine, stresses({"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"}), {1, 2, 3, 4, 5, 6, 7, 8, 9});
   const Matrix3d rows = (Matrix3d() << 1, 2, 3, 4, 5, 6, 7, 8, 9).finished(),
-                 upper = (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished();
+                 upper = test::symmetric({1, 2, 3, 5, 6, 9});
   expect_tensor(nine, "stress_x, stress_y, stress_z", {}, rows);
   expect_tensor(nine, "stress_xx,stress_xy,stress_xz,stress_yx,stress_yy,stress_yz,stress_zx,stress_zy,stress_zz", {},
                 rows);
@@ -412,7 +395,7 @@ TEST(ComponentNames, TellAnyOrder) {
   refuses(file, "six", TensorOrder::fsl, "leave --order out");
   expect_tensor(file, "nine", {}, rows);
   expect_tensor(file, list, {}, rows);
-  expect_tensor(file, "szz,syz,syy,sxz,sxy,sxx", {}, (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished());
+  expect_tensor(file, "szz,syz,syy,sxz,sxy,sxx", {}, test::symmetric({1, 2, 3, 5, 6, 9}));
   refuses(file, "szz,syz,syy,sxz,sxy,sxx", TensorOrder::fsl, "leave --order out");
 }
 

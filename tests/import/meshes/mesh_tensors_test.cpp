@@ -4,13 +4,10 @@
 #include <vtkImageData.h>
 #include <vtkPointData.h>
 #include <vtkRectilinearGrid.h>
-#include <vtkUnsignedCharArray.h>
 
-#include "base/process/progress.h"
 #include "tests/import/mesh_files.h"
-#include "tests/import/mesh_fixtures.h"
+#include "tests/import/velocity_meshes.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/import_file.h"
 #include "tools/import/meshes/flat_mesh.h"
 
 namespace tensorray {
@@ -18,30 +15,17 @@ namespace {
 
 using namespace mesh_fixtures;
 
-const Map identity = [](const Vector3d& p) { return p; };
-
 Matrix3d tensor_at(vtkDataSet& mesh, vtkIdType point) {
   auto* const array = vtkDoubleArray::SafeDownCast(mesh.GetPointData()->GetArray(tensor_array));
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(array->GetPointer(9 * point));
 }
 
-Matrix3d velocity_gradient() {
-  Matrix3d gradient;
-  gradient << 1, 2, 3, -4, 5, 6, 7, -8, 10;
-  return gradient;
-}
+void add_linear_velocity(vtkDataSet& mesh) { add_array<3>(mesh, "velocity", linear); }
 
-void add_linear_velocity(vtkDataSet& mesh, const Matrix3d& gradient) {
-  add_array<3>(mesh, "velocity", [&](const Vector3d& p) { return Vector3d(gradient * p + Vector3d(0.3, -0.1, 0.2)); });
-}
-
-void add_constant_cell_array(vtkDataSet& mesh, const char* name, int components, double value) {
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->SetNumberOfComponents(components);
-  array->SetNumberOfTuples(mesh.GetNumberOfCells());
-  array->Fill(value);
-  mesh.GetCellData()->AddArray(array);
+/// A cell array of ones.
+template <int components>
+void add_ones(vtkDataSet& mesh, const char* name) {
+  add_cell_array<components>(mesh, name, [](vtkIdType) { return Eigen::Matrix<double, components, 1>::Ones(); });
 }
 
 void expect_everywhere(vtkDataSet& mesh, const Matrix3d& expected, double tolerance) {
@@ -59,30 +43,26 @@ TEST(MeshTensors, ALinearVelocityIsDifferentiatedExactlyRowByRow) {
   for (const int type : {VTK_PYRAMID, VTK_LAGRANGE_HEXAHEDRON, VTK_HEXAHEDRON, VTK_WEDGE, VTK_TETRA,
                          VTK_QUADRATIC_HEXAHEDRON, VTK_QUADRATIC_TETRA})
     meshes.push_back(unit_cube(type, 3, bent));
-  const Matrix3d gradient = velocity_gradient();
+  const auto with_surface = unit_cube(VTK_HEXAHEDRON, 2, bent);  // A surface in a mesh does not count.
+  const std::vector<vtkIdType> face{0, 1, 2, 3};
+  with_surface->InsertNextCell(VTK_QUAD, 4, face.data());
+  meshes.push_back(with_surface);
+  const Matrix3d gradient = shear();
   for (const auto& mesh : meshes) {
     SCOPED_TRACE(mesh->GetCellType(0));
-    add_linear_velocity(*mesh, gradient);
+    add_linear_velocity(*mesh);
     expect_everywhere(*with_tensors(*mesh, {"velocity"}, Take::gradient, {}), gradient, 1e-10);
     expect_everywhere(*with_tensors(*mesh, {"velocity"}, Take::strain, {}), 0.5 * (gradient + gradient.transpose()),
                       1e-10);
   }
 }
 
-TEST(MeshTensors, SurfacesInAMeshDoNotChangeItsDerivatives) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 2, bent);
-  const std::vector<vtkIdType> face{0, 1, 2, 3};
-  mesh->InsertNextCell(VTK_QUAD, 4, face.data());
-  add_linear_velocity(*mesh, velocity_gradient());
-  expect_everywhere(*with_tensors(*mesh, {"velocity"}, Take::gradient, {}), velocity_gradient(), 1e-10);
-}
-
 TEST(ChooseArray, TakesTheNamedOrTheOnlyOneThatSuits) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 1, identity);
-  add_linear_velocity(*mesh, velocity_gradient());
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 1, unchanged);
+  add_linear_velocity(*mesh);
   add_array<9>(*mesh, "grad", [](const Vector3d& p) { return flat(linear_tensor(p)); });
-  add_constant_cell_array(*mesh, "grad", 9, 1);
-  add_constant_cell_array(*mesh, "velocity", 6, 1);
+  add_ones<9>(*mesh, "grad");
+  add_ones<6>(*mesh, "velocity");
   EXPECT_EQ(choose_array(*mesh, "", Take::gradient).name, "velocity");
   const ArrayChoice points = choose_array(*mesh, "grad", Take::tensor);
   EXPECT_EQ(points.name, "grad");
@@ -91,13 +71,13 @@ TEST(ChooseArray, TakesTheNamedOrTheOnlyOneThatSuits) {
 }
 
 TEST(ChooseArray, ErrorsListTheArrays) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 1, identity);
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 1, unchanged);
   const auto refuses = [&](const char* name, Take take, const auto& matcher) {
     EXPECT_THAT([&] { choose_array(*mesh, name, take); }, ThrowsMessage<std::invalid_argument>(matcher));
   };
   refuses("", Take::tensor, HasSubstr("there are no arrays"));
-  add_linear_velocity(*mesh, velocity_gradient());
-  add_constant_cell_array(*mesh, "pressure", 1, 1);
+  add_linear_velocity(*mesh);
+  add_ones<1>(*mesh, "pressure");
   const auto list = HasSubstr("there are: velocity (3 components, points), pressure (1 component, cells)");
   refuses("", Take::tensor, AllOf(list, HasSubstr("no array suits")));
   refuses("vellocity", Take::gradient, AllOf(list, HasSubstr("no array \"vellocity\" (--gradient-of)")));
@@ -110,7 +90,7 @@ Matrix3d symmetric(const Vector3d& p) { return linear_tensor(p) + linear_tensor(
 
 /// A cube with a point array for each component of a tensor: sxx, sxy, ..., szz.
 Grid cube_with_components(Matrix3d (*tensor)(const Vector3d&)) {
-  const Grid mesh = unit_cube(VTK_HEXAHEDRON, 2, [](const Vector3d& p) { return p; });
+  const Grid mesh = unit_cube(VTK_HEXAHEDRON, 2, unchanged);
   for (int i = 0; i < 9; ++i)
     add_array<1>(*mesh, std::string("s") + "xyz"[i / 3] + "xyz"[i % 3],
                  [&](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(tensor(p)(i / 3, i % 3)); });
@@ -122,12 +102,9 @@ void expect_tensors(vtkDataSet& mesh, const std::string& list, std::optional<Ten
   const ArrayChoice choice = join_arrays(mesh, list);
   EXPECT_FALSE(choice.of_cells);
   const auto joined = with_tensors(mesh, choice, Take::tensor, order);
-  auto* const tensors = vtkDoubleArray::SafeDownCast(joined->GetPointData()->GetArray(tensor_array));
-  ASSERT_TRUE(tensors);
-  for (vtkIdType i = 0; i < mesh.GetNumberOfPoints(); ++i) {
-    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> value(tensors->GetPointer(9 * i));
-    EXPECT_EQ(Matrix3d(value), tensor(Vector3d(mesh.GetPoint(i)))) << list;
-  }
+  ASSERT_TRUE(joined->GetPointData()->HasArray(tensor_array));
+  for (vtkIdType i = 0; i < mesh.GetNumberOfPoints(); ++i)
+    EXPECT_EQ(tensor_at(*joined, i), tensor(Vector3d(mesh.GetPoint(i)))) << list;
 }
 
 TEST(ComponentArrays, NamesThatTellNoOrderNeedOne) {
@@ -166,11 +143,7 @@ TEST(ComponentArrays, NamesInAListMayHaveCommas) {
 TEST(ComponentArrays, ErrorsNameTheArrayAndListTheOthers) {
   const Grid mesh = cube_with_components(symmetric);
   add_array<3>(*mesh, "v", [](const Vector3d& p) { return p; });
-  vtkNew<vtkDoubleArray> of_cells;
-  of_cells->SetName("c");
-  of_cells->SetNumberOfTuples(mesh->GetNumberOfCells());
-  of_cells->Fill(0);
-  mesh->GetCellData()->AddArray(of_cells);
+  add_ones<1>(*mesh, "c");
   for (const auto& [list, part] :
        {std::pair("sxx,syy,szz,sxy,syz", "lists 5 arrays, and a tensor has 6 or 9"),
         {"sxx,syy,szz,sxy,syz,sxz,", "no array \"\" in the list"},
@@ -230,17 +203,9 @@ Matrix3d plane_tensor(const Vector3d& p) {
   return (Matrix3d() << c[0], c[3], 0, c[3], c[1], 0, 0, 0, c[2]).finished();
 }
 
-TensorGrid import(const std::filesystem::path& file, ImportSettings settings = {}, double* thickness = nullptr) {
-  settings.files = {file};
-  ImportReport report;
-  TensorGrid grid = import_tensors(settings, Progress(), report);
-  if (thickness) *thickness = report.thickness;
-  return grid;
-}
-
 /// Expects an error of the user's with these words.
 void refuses(const std::filesystem::path& file, const ImportSettings& settings, const std::string& words) {
-  EXPECT_THAT([&] { import(file, settings); }, ThrowsMessage<std::invalid_argument>(HasSubstr(words)));
+  EXPECT_THAT([&] { imported(file, settings); }, ThrowsMessage<std::invalid_argument>(HasSubstr(words)));
 }
 
 void expect_everywhere(const TensorGrid& grid, const std::function<Matrix3d(const Vector3d&)>& tensor) {
@@ -265,9 +230,8 @@ TEST(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
       write_xml(*mesh, folder / "a.vtu");
       ImportSettings settings = settings_of_plane("stress", 0.75);
       settings.sampling.resolution = 0.25;
-      double thickness = 0;
-      const TensorGrid grid = import(folder / "a.vtu", settings, &thickness);
-      EXPECT_EQ(thickness, 0.75);
+      const auto [grid, report] = imported(folder / "a.vtu", settings);
+      EXPECT_EQ(report.thickness, 0.75);
       EXPECT_EQ(grid.active_voxels(), 17u * 17);
       const Eigen::AlignedBox3i box = grid.active_box();
       EXPECT_EQ(box.min()[axis], box.max()[axis]);
@@ -289,9 +253,9 @@ TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
   settings.array = "S";
   refuses(folder / "a.vtu", settings, "plane (xx yy zz xy) or 2x2");
   settings.order = TensorOrder::vtk;
-  EXPECT_THROW(import(folder / "a.vtu", settings), std::invalid_argument);
+  EXPECT_THROW(imported(folder / "a.vtu", settings).grid, std::invalid_argument);
   settings.order = TensorOrder::two_by_two;
-  for_each_voxel(import(folder / "a.vtu", settings), [&](const Vector3d& p, const Matrix3d& tensor) {
+  for_each_voxel(imported(folder / "a.vtu", settings).grid, [&](const Vector3d& p, const Matrix3d& tensor) {
     const Eigen::Vector4d c = plane(p);
     EXPECT_LT((tensor - (Matrix3d() << c[0], c[1], 0, c[2], c[3], 0, 0, 0, 0).finished()).norm(), 1e-5);
   });
@@ -299,7 +263,7 @@ TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
   for (int i = 0; i < 4; ++i) mesh->GetPointData()->GetArray("S")->SetComponentName(i, names[i]);
   write_xml(*mesh, folder / "b.vtu");
   settings.order.reset();
-  expect_everywhere(import(folder / "b.vtu", settings), plane_tensor);
+  expect_everywhere(imported(folder / "b.vtu", settings).grid, plane_tensor);
 }
 
 TEST(FlatMesh, ScalarArraysOfAPlaneAreJoined) {
@@ -312,7 +276,7 @@ TEST(FlatMesh, ScalarArraysOfAPlaneAreJoined) {
   for (const bool with_zz : {false, true}) {
     ImportSettings settings;
     settings.array = with_zz ? "sxy,szz,sxx,syy" : "sxx,syy,sxy";
-    for_each_voxel(import(folder / "a.vtu", settings), [&](const Vector3d& p, const Matrix3d& tensor) {
+    for_each_voxel(imported(folder / "a.vtu", settings).grid, [&](const Vector3d& p, const Matrix3d& tensor) {
       Matrix3d expected = plane_tensor(p);
       if (!with_zz) expected(2, 2) = 0;
       EXPECT_LT((tensor - expected).norm(), 1e-5);
@@ -330,24 +294,16 @@ TEST(FlatMesh, FlatImagesAndRectilinearGrids) {
   add_array<4>(*image, "S", plane);
   write_xml(*image, folder / "a.vti");
   ImportSettings settings = settings_of_plane("S", 3);
-  const TensorGrid voxels = import(folder / "a.vti", settings);
+  const TensorGrid voxels = imported(folder / "a.vti", settings).grid;
   EXPECT_EQ(voxels.active_voxels(), 20u);
   EXPECT_EQ(voxels.to_world.linear()(2, 2), 3);
   expect_everywhere(voxels, plane_tensor);
 
-  vtkNew<vtkRectilinearGrid> rectilinear;
-  vtkNew<vtkDoubleArray> x, y, z;
-  for (const double value : {0.0, 1.0, 4.0}) x->InsertNextValue(value), y->InsertNextValue(value);
-  z->InsertNextValue(2);
-  rectilinear->SetDimensions(3, 3, 1);
-  rectilinear->SetXCoordinates(x);
-  rectilinear->SetYCoordinates(y);
-  rectilinear->SetZCoordinates(z);
+  const auto rectilinear = rectilinear_grid({0, 1, 4}, {0, 1, 4}, {2});
   add_array<4>(*rectilinear, "S", plane);
   write_xml(*rectilinear, folder / "a.vtr");
   settings.sampling.resolution = 0.5;
-  const TensorGrid sampled = import(folder / "a.vtr", settings);
-  EXPECT_EQ(sampled.active_voxels(), 81u);
+  EXPECT_EQ(imported(folder / "a.vtr", settings).voxels(), 81u);
 }
 
 TEST(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
@@ -362,7 +318,7 @@ TEST(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
   add_array<9>(*bent_square, "T", [](const Vector3d& p) { return flat(linear_tensor(p)); });
   write_xml(*bent_square, folder / "bent.vtu");
   EXPECT_THAT(
-      [&] { import(folder / "bent.vtu", settings); },
+      [&] { imported(folder / "bent.vtu", settings).grid; },
       ThrowsMessage<std::invalid_argument>(testing::AllOf(HasSubstr("bent.vtu"), HasSubstr("surface in space"))));
   settings.thickness = 1;
   write_xml(*bar(0, 3), folder / "solid.vtu");
@@ -388,7 +344,7 @@ TEST(FlatMesh, VectorsOfImagesMayHaveTwoComponents) {
       settings.array = array;
       settings.take = Take::gradient;
       if (sampled) settings.sampling.resolution = 0.5;
-      const TensorGrid grid = import(folder / "a.vti", settings);
+      const TensorGrid grid = imported(folder / "a.vti", settings).grid;
       EXPECT_EQ(grid.active_voxels(), sampled ? 9u * 7 : 5u * 4);
       expect_everywhere(grid, [&](const Vector3d&) { return expected; });
     }
@@ -402,11 +358,11 @@ TEST(FlatMesh, TheThicknessIsNoEdgeThatIsDivided) {
   ImportSettings settings = settings_of_plane("stress", 100);
   for (const auto& resolution : {decltype(settings.sampling.resolution)(17), {Vector3i(17, 17, 1)}}) {
     settings.sampling.resolution = resolution;
-    EXPECT_EQ(import(folder / "a.vtu", settings).active_voxels(), 17u * 17);
+    EXPECT_EQ(imported(folder / "a.vtu", settings).voxels(), 17u * 17);
   }
   settings.sampling.resolution = {};
   settings.sampling.bounds = Eigen::AlignedBox3d(Vector3d(1, 1, 0), Vector3d(1.25, 1.25, 0));  // Half of an edge.
-  EXPECT_EQ(import(folder / "a.vtu", settings).active_voxels(), 4u);
+  EXPECT_EQ(imported(folder / "a.vtu", settings).voxels(), 4u);
 }
 
 }  // namespace

@@ -2,10 +2,7 @@
 
 #include <cmath>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
-#include <vtkCellData.h>
 
 #include "tests/import/mesh_fixtures.h"
 #include "tools/import/meshes/mesh_tensors.h"
@@ -77,7 +74,8 @@ std::pair<double, double> worst_and_farthest(const TensorGrid& grid, const Profi
 TEST(MeshLevels, ALayerAtAWallHasFinerVoxelsInCellsOfEveryFamily) {
   for (const int type : families) {
     SCOPED_TRACE(type);
-    const Grid mesh = mesh_of(type, 12, graded, thin_layer);
+    const auto column = [](const Vector3d& p) { return Vector3d(graded(p).cwiseProduct(Vector3d(1, 0.5, 0.5))); };
+    const Grid mesh = mesh_of(type, 12, column, thin_layer);
     const Sampled one = sampled_with_levels(*mesh, voxels_of(1.0 / 16, 1));
     SamplingSettings exact = voxels_of(1.0 / 16);
     exact.error = 0.002;
@@ -105,8 +103,7 @@ TEST(MeshLevels, LinearFieldsEvenCellsAndLargeCellsHaveOneLevel) {
     const Grid linear = unit_cube(type, 12, graded);
     add_array<9>(*linear, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
     EXPECT_TRUE(sampled_with_levels(*linear, voxels_of(0.08)).grid.finer.empty());
-    const Grid even = mesh_of(
-        type, 12, [](const Vector3d& p) { return p; }, thin_layer);
+    const Grid even = mesh_of(type, 12, unchanged, thin_layer);
     if (type == VTK_PYRAMID || type == VTK_TETRA || type == VTK_QUADRATIC_TETRA) continue;  // Thinner than cubes.
     for (const double voxel : {1.0 / 12, 0.03})
       EXPECT_TRUE(sampled_with_levels(*even, voxels_of(voxel)).grid.finer.empty()) << voxel;
@@ -129,14 +126,9 @@ TEST(MeshLevels, AFineSpotIsRefinedWhereItIs) {
 // With tensors at cells alone, these are compared at their centres.
 TEST(MeshLevels, TensorsOfCellsAndTheWantedErrorCount) {
   const Grid mesh = unit_cube(VTK_HEXAHEDRON, 16, graded);
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(tensor_array);
-  array->SetNumberOfComponents(9);
-  for (vtkIdType i = 0; i < mesh->GetNumberOfCells(); ++i) {
-    const double value = thin_layer(Vector3d(mesh->GetCell(i)->GetBounds()[0], 0, 0));
-    array->InsertNextTuple9(value, 0, 0, 0, value, 0, 0, 0, value);
-  }
-  mesh->GetCellData()->AddArray(array);
+  add_cell_array<9>(*mesh, tensor_array, [&](vtkIdType i) {
+    return flat(Matrix3d::Identity() * thin_layer(Vector3d(mesh->GetCell(i)->GetBounds()[0], 0, 0)));
+  });
   std::size_t before = 0;
   for (const double error : {0.9, 0.1, 0.01, 0.0}) {
     SamplingSettings settings = voxels_of(1.0 / 16);
@@ -162,8 +154,7 @@ TEST(MeshLevels, TheCoarsestAndTheFinestAreChosenOrGiven) {
   finest.resolution = {};
   const SamplingReport counted = sampled_with_levels(*mesh, finest).report;
   EXPECT_NEAR(std::log2(counted.voxel.x() * 32), std::round(std::log2(counted.voxel.x() * 32)), 1e-9);
-  const Grid even = mesh_of(
-      VTK_HEXAHEDRON, 16, [](const Vector3d& p) { return p; }, thin_layer);
+  const Grid even = mesh_of(VTK_HEXAHEDRON, 16, unchanged, thin_layer);
   EXPECT_NEAR(sampled_with_levels(*even, {}).report.voxel.x(), 1.0 / 16, 1e-9);
 }
 
@@ -191,20 +182,15 @@ TEST(MeshLevels, RoundingIsOfTheMedianAndDoublesWithEachLevel) {
 
 TEST(MeshLevels, AreTheSameOnAnyNumberOfThreads) {
   const Grid mesh = mesh_of(VTK_TETRA, 10, graded, thin_layer);
-  std::vector<TensorGrid> grids;
+  std::vector<Sampled> results;
   for (const std::size_t threads : {1u, 3u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    grids.push_back(sampled_with_levels(*mesh, voxels_of(0.1)).grid);
+    results.push_back(sampled_with_levels(*mesh, voxels_of(0.1)));
   }
-  ASSERT_FALSE(grids[0].finer.empty());
-  ASSERT_EQ(grids[0].finer.size(), grids[1].finer.size());
-  for (std::size_t level = 0; level < grids[0].finer.size(); ++level) {
-    ASSERT_EQ(grids[0].finer[level].size(), grids[1].finer[level].size());
-    for (std::size_t k = 0; k < grids[0].finer[level].size(); ++k) {
-      EXPECT_EQ(grids[0].finer[level][k].origin, grids[1].finer[level][k].origin);
-      EXPECT_TRUE(grids[0].finer[level][k].values == grids[1].finer[level][k].values);
-    }
-  }
+  ASSERT_FALSE(results[0].grid.finer.empty());
+  ASSERT_EQ(results[0].grid.finer.size(), results[1].grid.finer.size());
+  for (std::size_t level = 0; level <= results[0].grid.finer.size(); ++level)
+    expect_same_blocks(results[0].level(level), results[1].level(level));
 }
 
 }  // namespace

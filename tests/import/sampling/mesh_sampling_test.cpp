@@ -22,15 +22,12 @@ namespace {
 
 using namespace mesh_fixtures;
 
-const Map identity = [](const Vector3d& p) { return p; };
-
 void add_linear_tensor(vtkDataSet& mesh) {
   add_array<9>(mesh, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
 }
 
 TensorGrid sampled(vtkDataSet& mesh, const SamplingSettings& settings, SamplingReport& report) {
-  const Progress progress;
-  return sample_mesh(mesh, settings, progress, report);
+  return sample_mesh(mesh, settings, Progress(), report);
 }
 
 TensorGrid sampled(vtkDataSet& mesh, const SamplingSettings& settings) {
@@ -38,9 +35,11 @@ TensorGrid sampled(vtkDataSet& mesh, const SamplingSettings& settings) {
   return sampled(mesh, settings, report);
 }
 
-SamplingSettings resolution(int count) {
+/// Of a number of voxels along the longest edge or along each, or of their size.
+template <class Resolution>
+SamplingSettings resolution(const Resolution& value) {
   SamplingSettings settings;
-  settings.resolution = count;
+  settings.resolution = value;
   return settings;
 }
 
@@ -52,12 +51,29 @@ double mesh_volume(vtkDataSet& mesh) {
   return volume;
 }
 
-void expect_linear(const TensorGrid& grid) {
+/// The greatest difference of a component from the value at its voxel.
+template <class Value>
+double worst_error(const TensorGrid& grid, const Value& value) {
   double worst = 0;
   for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
-    worst = std::max(worst, (tensor - linear_tensor(p)).cwiseAbs().maxCoeff());
+    worst = std::max(worst, (tensor - value(p)).cwiseAbs().maxCoeff());
   });
-  EXPECT_LT(worst, 5e-6);  // single precision of numbers up to 23, and a position error of at most 1e-6 of the diagonal
+  return worst;
+}
+
+void expect_linear(const TensorGrid& grid) {
+  // Single precision of numbers up to 23, and a position error of at most 1e-6 of the diagonal.
+  EXPECT_LT(worst_error(grid, linear_tensor), 5e-6);
+}
+
+/// Expects that a mesh is sampled to the same bits by any number of threads.
+void expect_same_on_threads(vtkDataSet& mesh, const SamplingSettings& settings) {
+  std::vector<TensorGrid> grids;
+  for (const std::size_t threads : {1u, 2u, 3u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    grids.push_back(sampled(mesh, settings));
+    expect_same_blocks(grids.back(), grids.front());
+  }
 }
 
 // Spacings of 1/(n − 1), and cells of edge 1/3, put voxels on faces, edges and corners of the cells and of the cube.
@@ -68,7 +84,7 @@ TEST(MeshSampling, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
     for (const bool is_bent : {false, true}) {
       if (is_bent && type == VTK_PYRAMID) continue;  // Its sides would be gaps.
       SCOPED_TRACE(testing::Message() << type << is_bent);
-      const auto mesh = unit_cube(type, 3, is_bent ? Map(bent) : identity);
+      const auto mesh = unit_cube(type, 3, is_bent ? Map(bent) : unchanged);
       add_linear_tensor(*mesh);
       SamplingReport report;
       const TensorGrid grid = sampled(*mesh, resolution(13), report);
@@ -80,14 +96,10 @@ TEST(MeshSampling, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
 }
 
 TEST(MeshSampling, QuadraticCellsGiveAQuadraticFieldExactly) {
-  const auto mesh = unit_cube(VTK_QUADRATIC_TETRA, 2, identity);
+  const auto mesh = unit_cube(VTK_QUADRATIC_TETRA, 2, unchanged);
   const auto value = [](const Vector3d& p) { return Matrix3d(linear_tensor(p) * (1 + p.x() - 2 * p.y() + p.z())); };
   add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) { return flat(value(p)); });
-  double worst = 0;
-  for_each_voxel(sampled(*mesh, resolution(15)), [&](const Vector3d& p, const Matrix3d& tensor) {
-    worst = std::max(worst, (tensor - value(p)).cwiseAbs().maxCoeff());
-  });
-  EXPECT_LT(worst, 1e-5);
+  EXPECT_LT(worst_error(sampled(*mesh, resolution(15)), value), 1e-5);
 }
 
 TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
@@ -101,9 +113,7 @@ TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
   EXPECT_TRUE(longest.to_world.translation().isApprox(Vector3d(1, 0, 0)));
   expect_linear(longest);
 
-  SamplingSettings settings;
-  settings.resolution = Vector3i(5, 6, 7);
-  expect_linear(sampled(*mesh, settings, report));
+  expect_linear(sampled(*mesh, resolution(Vector3i(5, 6, 7)), report));
   EXPECT_EQ(report.size, Vector3i(5, 6, 7));
   EXPECT_TRUE(report.voxel.isApprox(Vector3d(0.5, 0.2, 0.5 / 6)));
   EXPECT_EQ(report.active, 5u * 6u * 7u);
@@ -111,8 +121,7 @@ TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
   // A voxel of another size than the body's parts becomes smaller: the field has the faces, and no more.
   for (const auto& [voxel, size] :
        {std::pair(0.3, Vector3i(8, 5, 3)), {0.667, Vector3i(4, 3, 2)}, {2.0, Vector3i(2, 2, 2)}}) {
-    settings.resolution = voxel;
-    const TensorGrid grid = sampled(*mesh, settings, report);
+    const TensorGrid grid = sampled(*mesh, resolution(voxel), report);
     EXPECT_EQ(report.size, size);
     EXPECT_EQ(report.active, static_cast<std::size_t>(size.prod()));
     EXPECT_LE(report.voxel.maxCoeff(), 1.01 * voxel);
@@ -193,11 +202,10 @@ TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {
 }
 
 TEST(MeshSampling, BoundsCropTheLatticeAndTheReport) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 4, identity);
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 4, unchanged);
   add_linear_tensor(*mesh);
-  SamplingSettings settings;
+  SamplingSettings settings = resolution(0.125);
   settings.bounds = Eigen::AlignedBox3d(Vector3d(0.25, 0.25, 0), Vector3d(0.5, 0.5, 2));
-  settings.resolution = 0.125;
   SamplingReport report;
   const TensorGrid grid = sampled(*mesh, settings, report);
   EXPECT_EQ(report.size, Vector3i(3, 3, 17));
@@ -213,7 +221,7 @@ TEST(MeshSampling, BoundsCropTheLatticeAndTheReport) {
 TEST(MeshSampling, ReportsThePeakThatCoarseVoxelsMiss) {
   // |T| = √3 max(0, 1 − 8 |x − 1/16|) on cells of edge 1/16. Voxels of edge 1/8 miss the peak by half a tooth, where
   // |T| has half its peak value.
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 16, identity);
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 16, unchanged);
   add_array<9>(*mesh, tensor_array, [](const Vector3d& p) {
     return flat(Matrix3d::Identity() * std::max(0.0, 1 - 8 * std::abs(p.x() - 0.0625)));
   });
@@ -229,7 +237,7 @@ TEST(MeshSampling, ReportsThePeakThatCoarseVoxelsMiss) {
 }
 
 TEST(MeshSampling, OfCellsThatListMorePointsThanTheirTypeHasTheFirstCount) {
-  const auto quadratic = unit_cube(VTK_QUADRATIC_HEXAHEDRON, 2, identity);
+  const auto quadratic = unit_cube(VTK_QUADRATIC_HEXAHEDRON, 2, unchanged);
   const auto mesh = Grid::New();
   mesh->SetPoints(quadratic->GetPoints());
   for (vtkIdType i = 0; i < quadratic->GetNumberOfCells(); ++i) {
@@ -248,7 +256,7 @@ TEST(MeshSampling, OfCellsThatListMorePointsThanTheirTypeHasTheFirstCount) {
 }
 
 TEST(MeshSampling, OverlappingCellsGiveTheSameOnAnyNumberOfThreads) {
-  const auto mesh = unit_cube(VTK_TETRA, 6, [](const Vector3d& p) { return p; });
+  const auto mesh = unit_cube(VTK_TETRA, 6, unchanged);
   const auto other = unit_cube(VTK_HEXAHEDRON, 5, bent);
   const vtkIdType first = mesh->GetNumberOfPoints();
   for (vtkIdType i = 0; i < other->GetNumberOfPoints(); ++i) mesh->GetPoints()->InsertNextPoint(other->GetPoint(i));
@@ -262,23 +270,11 @@ TEST(MeshSampling, OverlappingCellsGiveTheSameOnAnyNumberOfThreads) {
     point += 1;
     return Eigen::Matrix<double, 9, 1>(Eigen::Matrix<double, 9, 1>::LinSpaced(point, point + 1.0));
   });
-  std::vector<TensorGrid> grids;
-  for (const std::size_t threads : {1u, 2u, 3u}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    grids.push_back(sampled(*mesh, resolution(40)));
-  }
-  for (std::size_t i = 1; i < grids.size(); ++i) {
-    ASSERT_EQ(grids[i].blocks.size(), grids[0].blocks.size());
-    for (std::size_t k = 0; k < grids[0].blocks.size(); ++k) {
-      EXPECT_EQ(grids[i].blocks[k].origin, grids[0].blocks[k].origin);
-      EXPECT_EQ(grids[i].blocks[k].active, grids[0].blocks[k].active);
-      EXPECT_TRUE(grids[i].blocks[k].values == grids[0].blocks[k].values);
-    }
-  }
+  expect_same_on_threads(*mesh, resolution(40));
 }
 
 TEST(MeshSampling, StopsWhenCancelledAndReportsToTheCaller) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 3, identity);
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 3, unchanged);
   add_linear_tensor(*mesh);
   SamplingReport report;
   Progress progress;
@@ -292,7 +288,7 @@ TEST(MeshSampling, StopsWhenCancelledAndReportsToTheCaller) {
 }
 
 TEST(MeshSampling, RefusesWhatCannotBeSampled) {
-  const auto cube = unit_cube(VTK_HEXAHEDRON, 1, identity);
+  const auto cube = unit_cube(VTK_HEXAHEDRON, 1, unchanged);
   add_linear_tensor(*cube);
   const auto flat_mesh = curvilinear({4, 4, 1}, [](const Vector3d& p) { return Vector3d(p.x(), p.y(), 0); });
   add_linear_tensor(*flat_mesh);
@@ -302,16 +298,11 @@ TEST(MeshSampling, RefusesWhatCannotBeSampled) {
   };
   refuses(resolution(1), "--resolution");
   refuses(resolution(1025), "2^30");
+  refuses(resolution(Vector3i(4, 0, 4)), "--resolution");
+  for (const double voxel : {0.0, -1.0, 3.0, std::numeric_limits<double>::quiet_NaN()})
+    refuses(resolution(voxel), "--voxel-size");
+  refuses(resolution(1e-300), "2^30");
   SamplingSettings settings;
-  settings.resolution = Vector3i(4, 0, 4);
-  refuses(settings, "--resolution");
-  for (const double voxel : {0.0, -1.0, 3.0, std::numeric_limits<double>::quiet_NaN()}) {
-    settings.resolution = voxel;
-    refuses(settings, "--voxel-size");
-  }
-  settings.resolution = 1e-300;
-  refuses(settings, "2^30");
-  settings = {};
   settings.bounds = Eigen::AlignedBox3d(Vector3d(2, 2, 2), Vector3d(3, 3, 3));
   refuses(settings, "nothing of the mesh is inside, which goes from (0, 0, 0) to (1, 1, 1)");
   settings.bounds = Eigen::AlignedBox3d(Vector3d(0, 0, 0), Vector3d(1, 0, 1));
@@ -331,17 +322,6 @@ double layer_average(double from, double to) {
   return layer * (std::exp(-from / layer) - std::exp(-to / layer)) / (to - from);
 }
 
-TensorGrid sampled(vtkDataSet& mesh, double voxel, SamplingReport& report) {
-  SamplingSettings settings;
-  settings.resolution = voxel;
-  return sample_mesh(mesh, settings, Progress(), report);
-}
-
-TensorGrid sampled(vtkDataSet& mesh, double voxel) {
-  SamplingReport report;
-  return sampled(mesh, voxel, report);
-}
-
 /// A unit cube above a wall at z = 0. Cells grow away from the wall, where they are a thousandth thick.
 vtkSmartPointer<vtkStructuredGrid> graded_mesh(const Map& map) {
   return curvilinear({5, 5, 61}, [&](const Vector3d& p) {
@@ -356,12 +336,12 @@ void add_layer(vtkDataSet& mesh, const std::function<double(const Vector3d&)>& d
 }
 
 TEST(VoxelAverages, OfABoundaryLayerHaveLessErrorThanTheirCentres) {
-  const auto mesh = graded_mesh([](const Vector3d& p) { return p; });
+  const auto mesh = graded_mesh(unchanged);
   add_layer(*mesh, [](const Vector3d& p) { return p.z(); });
   for (const double most : {0.11, 0.09, 0.07, 0.047}) {
     const double voxel = 1 / std::ceil(1 / most);  // Voxels are on both faces of the cube.
     double of_averages = 0, of_centres = 0;
-    for_each_voxel(sampled(*mesh, voxel), [&](const Vector3d& p, const Matrix3d& tensor) {
+    for_each_voxel(sampled(*mesh, resolution(voxel)), [&](const Vector3d& p, const Matrix3d& tensor) {
       if (p.z() < voxel / 2 || p.z() > 0.5) return;  // Voxels that the mesh fills.
       const double truth = layer_average(p.z() - voxel / 2, p.z() + voxel / 2);
       of_averages += std::pow(tensor(0, 0) - truth, 2);
@@ -374,22 +354,18 @@ TEST(VoxelAverages, OfABoundaryLayerHaveLessErrorThanTheirCentres) {
 TEST(VoxelAverages, OfALinearFieldAreItsValuesAtTheCentresAlsoAtWalls) {
   for (const int type : {VTK_HEXAHEDRON, VTK_TETRA, VTK_WEDGE, VTK_PYRAMID, VTK_QUADRATIC_HEXAHEDRON}) {
     const auto mesh = unit_cube(type, 12, bent);
-    add_array<9>(*mesh, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
+    add_linear_tensor(*mesh);
     SamplingReport report;
-    double worst = 0;
-    for_each_voxel(sampled(*mesh, 0.25, report), [&](const Vector3d& p, const Matrix3d& tensor) {
-      worst = std::max(worst, (tensor - linear_tensor(p)).cwiseAbs().maxCoeff());
-    });
+    EXPECT_LT(worst_error(sampled(*mesh, resolution(0.25), report), linear_tensor), 5e-5) << type;
     EXPECT_EQ(report.active, 125u) << type;
-    EXPECT_LT(worst, 5e-5) << type;
   }
 }
 
 TEST(VoxelAverages, WhereCellsAreAsLargeAsVoxelsCentresCount) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 4, [](const Vector3d& p) { return p; });
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 4, unchanged);
   const auto value = [](const Vector3d& p) { return std::sin(9 * p.x()); };
   add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) { return flat(value(p) * Matrix3d::Identity()); });
-  for_each_voxel(sampled(*mesh, 0.25), [&](const Vector3d& p, const Matrix3d& tensor) {
+  for_each_voxel(sampled(*mesh, resolution(0.25)), [&](const Vector3d& p, const Matrix3d& tensor) {
     EXPECT_EQ(static_cast<float>(tensor(0, 0)), static_cast<float>(value(p)));
   });
 }
@@ -397,66 +373,43 @@ TEST(VoxelAverages, WhereCellsAreAsLargeAsVoxelsCentresCount) {
 TEST(VoxelAverages, AreTheSameBitsOnAnyNumberOfThreads) {
   const auto mesh = graded_mesh(bent);
   add_layer(*mesh, [](const Vector3d& p) { return p.z(); });
-  std::vector<TensorGrid> grids;
-  for (const std::size_t threads : {1u, 2u, 3u}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    grids.push_back(sampled(*mesh, 0.06));
-  }
-  for (std::size_t i = 1; i < grids.size(); ++i) {
-    ASSERT_EQ(grids[i].blocks.size(), grids[0].blocks.size());
-    for (std::size_t k = 0; k < grids[0].blocks.size(); ++k)
-      EXPECT_TRUE(grids[i].blocks[k].values == grids[0].blocks[k].values);
-  }
+  expect_same_on_threads(*mesh, resolution(0.12));
 }
 
 /// Twelve cubes in a row; a cell array `T` is 1 in all of them but one, which has `lone`.
 vtkSmartPointer<vtkStructuredGrid> row_with_lone_cell(double lone) {
   const auto mesh = curvilinear({13, 2, 2}, [](const Vector3d& p) { return Vector3d(12 * p.x(), p.y(), p.z()); });
-  vtkNew<vtkDoubleArray> array;
-  array->SetName("T");
-  array->SetNumberOfComponents(9);
-  for (int cell = 0; cell < 12; ++cell)
-    array->InsertNextTuple(flat((cell == 5 ? lone : 1.0) * Matrix3d::Identity()).data());
-  mesh->GetCellData()->AddArray(array);
+  add_cell_array<9>(*mesh, "T", [&](vtkIdType cell) { return flat((cell == 5 ? lone : 1) * Matrix3d::Identity()); });
   return mesh;
 }
 
 TEST(CellValues, LossIsMeasuredOnTheFilesOwnValues) {
   const auto mesh = row_with_lone_cell(8);
   SamplingReport report;
-  sampled(*with_tensors(*mesh, {"T", true}, Take::tensor, {}), 0.5, report);
+  sampled(*with_tensors(*mesh, {"T", true}, Take::tensor, {}), resolution(0.5), report);
   EXPECT_TRUE(report.of_cells);
   EXPECT_NEAR(report.native_peak, 8 * std::sqrt(3.0), 1e-12);
   EXPECT_NEAR(report.native_median, std::sqrt(3.0), 1e-12);
   EXPECT_NEAR(report.sampled_peak, 4.5 * std::sqrt(3.0), 1e-5);  // Points have the mean of their cells.
 }
 
-TEST(CellValues, ConstantGivesEachVoxelItsCell) {
+TEST(CellValues, ConstantGivesEachVoxelItsCellOrTheAverageOfThinnerOnes) {
   const auto mesh = row_with_lone_cell(8);
+  const auto tensors = with_tensors(*mesh, {"T", true}, Take::tensor, {}, CellValues::constant);
   SamplingReport report;
-  const TensorGrid grid =
-      sampled(*with_tensors(*mesh, {"T", true}, Take::tensor, {}, CellValues::constant), 0.4, report);
-  EXPECT_NEAR(report.sampled_peak, 8 * std::sqrt(3.0), 1e-5);
-  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+  for_each_voxel(sampled(*tensors, resolution(0.4), report), [&](const Vector3d& p, const Matrix3d& tensor) {
     if (std::abs(p.x() - std::round(p.x())) > 1e-3) {  // On a face, the first cell counts.
       EXPECT_EQ(tensor(1, 1), p.x() > 5 && p.x() < 6 ? 8 : 1) << p;
     }
   });
-  EXPECT_THROW(with_tensors(*mesh, {"T", true}, Take::gradient, {}, CellValues::constant), std::invalid_argument);
-}
-
-TEST(CellValues, ConstantInCellsThinnerThanVoxelsAreAveraged) {
-  const auto mesh = row_with_lone_cell(8);
-  const auto tensors = with_tensors(*mesh, {"T", true}, Take::tensor, {}, CellValues::constant);
-  SamplingSettings settings;
-  settings.resolution = Vector3i(3, 2, 2);  // Voxels of 6 x 1 x 1, centred at 0, 6 and 12.
-  SamplingReport report;
-  const TensorGrid grid = sample_mesh(*tensors, settings, Progress(), report);
-  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+  EXPECT_NEAR(report.sampled_peak, 8 * std::sqrt(3.0), 1e-5);
+  // Voxels of 6 x 1 x 1, centred at 0, 6 and 12.
+  for_each_voxel(sampled(*tensors, resolution(Vector3i(3, 2, 2))), [&](const Vector3d& p, const Matrix3d& tensor) {
     if (std::abs(p.x() - 6) < 1e-6) {
       EXPECT_NEAR(tensor(0, 0), (8 + 5) / 6.0, 1e-3);
     }
   });
+  EXPECT_THROW(with_tensors(*mesh, {"T", true}, Take::gradient, {}, CellValues::constant), std::invalid_argument);
 }
 
 // Every three-dimensional type of cell that VTK has is sampled, and divided into parts.
@@ -473,18 +426,12 @@ class EveryCellType : public ::testing::TestWithParam<CellKind> {
 
 TEST_P(EveryCellType, SampledVolumeIsThatOfTheCell) {
   const auto mesh = one_cell(GetParam(), oblique());
-  add_array<9>(*mesh, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
-  SamplingSettings settings;
-  settings.resolution = 14;
+  add_linear_tensor(*mesh);
   SamplingReport report;
-  const TensorGrid grid = sample_mesh(*mesh, settings, Progress(), report);
+  const TensorGrid grid = sampled(*mesh, resolution(14), report);
   const double volume = parametric_volume(GetParam()) * oblique().linear().determinant();
   EXPECT_NEAR(static_cast<double>(report.active) * report.voxel.prod(), volume, 0.12 * volume);
-  double worst = 0;
-  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
-    worst = std::max(worst, (tensor - linear_tensor(p)).cwiseAbs().maxCoeff());
-  });
-  EXPECT_LT(worst, 5e-5);
+  EXPECT_LT(worst_error(grid, linear_tensor), 5e-5);
 }
 
 TEST_P(EveryCellType, PartsHaveItsVolumeAndCentroid) {

@@ -267,41 +267,33 @@ std::vector<double> read_all(const Lattice& lattice) {
   return values;
 }
 
-TEST(ImageLatticeTest, PointsAreWhereVtkHasThem) {
-  const auto image = oblique_image();
-  const auto array = counting<vtkFloatArray>("stress", 9, image->GetNumberOfPoints());
-  image->GetPointData()->AddArray(array);
-  const Lattice lattice = lattice_of(image, array, false);
-  EXPECT_EQ(lattice.size, Eigen::Vector3i(4, 3, 5));
-  EXPECT_EQ(lattice.components, 9);
-  EXPECT_EQ(lattice.array, "stress");
-  EXPECT_EQ(lattice.frame, Eigen::Matrix3d::Identity());
-  for (int i = 0; i < image->GetNumberOfPoints(); ++i) {
-    const Eigen::Vector3d index(i % 4, i / 4 % 3, i / 12);
-    const Eigen::Vector3d world = lattice.to_world * index;
-    EXPECT_LT((world - Eigen::Vector3d(image->GetPoint(i))).norm(), 1e-13);
+/// Points are where VTK has them, and cells at their centres.
+TEST(ImageLatticeTest, ValuesAreWhereVtkHasThem) {
+  for (const bool of_cells : {false, true}) {
+    const auto image = oblique_image();
+    const vtkIdType count = of_cells ? image->GetNumberOfCells() : image->GetNumberOfPoints();
+    const int components = of_cells ? 6 : 9;
+    const auto array = of_cells ? counting<vtkDoubleArray>("stress", components, count)
+                                : counting<vtkFloatArray>("stress", components, count);
+    const Lattice lattice = lattice_of(image, array, of_cells);
+    const Eigen::Vector3i size = of_cells ? Eigen::Vector3i(3, 2, 4) : Eigen::Vector3i(4, 3, 5);
+    EXPECT_EQ(lattice.size, size);
+    EXPECT_EQ(lattice.components, components);
+    EXPECT_EQ(lattice.array, "stress");
+    EXPECT_EQ(lattice.frame, Eigen::Matrix3d::Identity());
+    for (int i = 0; i < count; ++i) {
+      Eigen::Vector3d expected = Eigen::Vector3d::Zero();
+      if (!of_cells) expected = Eigen::Vector3d(image->GetPoint(i));
+      for (int corner = 0; corner < (of_cells ? 8 : 0); ++corner)
+        expected += Eigen::Vector3d(image->GetCell(i)->GetPoints()->GetPoint(corner)) / 8;
+      const Eigen::Vector3d index(i % size.x(), i / size.x() % size.y(), i / size.x() / size.y());
+      EXPECT_LT((lattice.to_world * index - expected).norm(), 1e-13);
+    }
+    const std::vector<double> values = read_all(lattice);
+    ASSERT_EQ(values.size(), static_cast<std::size_t>(count * components));
+    for (int i = 0; i < count * components; ++i)
+      EXPECT_EQ(values[static_cast<std::size_t>(i)], 100 * (i / components) + i % components);
   }
-  const std::vector<double> values = read_all(lattice);
-  ASSERT_EQ(values.size(), 60u * 9);
-  for (std::size_t i = 0; i < values.size(); ++i)
-    EXPECT_EQ(values[i], 100.0 * static_cast<double>(i / 9) + static_cast<double>(i % 9));
-}
-
-TEST(ImageLatticeTest, CellsAreAtTheirCentres) {
-  const auto image = oblique_image();
-  const auto array = counting<vtkDoubleArray>("d", 6, image->GetNumberOfCells());
-  image->GetCellData()->AddArray(array);
-  const Lattice lattice = lattice_of(image, array, true);
-  EXPECT_EQ(lattice.size, Eigen::Vector3i(3, 2, 4));
-  for (int i = 0; i < image->GetNumberOfCells(); ++i) {
-    // A cell's centre is the middle of its eight corners.
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    vtkCell* const cell = image->GetCell(i);
-    for (int corner = 0; corner < 8; ++corner) centre += Eigen::Vector3d(cell->GetPoints()->GetPoint(corner)) / 8;
-    const Eigen::Vector3d index(i % 3, i / 3 % 2, i / 6);
-    EXPECT_LT((lattice.to_world * index - centre).norm(), 1e-13);
-  }
-  EXPECT_EQ(read_all(lattice)[6 * 23 + 5], 2305);
 }
 
 TEST(ImageLatticeTest, ImagesThatCannotBe) {

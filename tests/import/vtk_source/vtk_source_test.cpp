@@ -16,13 +16,11 @@
 #include VTK_CGNS(cgnslib.h)
 // clang-format on
 
-#include "base/process/progress.h"
 #include "tests/import/hdf5_writer.h"
 #include "tests/import/mesh_files.h"
-#include "tests/import/mesh_fixtures.h"
 #include "tests/import/openfoam_case.h"
+#include "tests/import/velocity_meshes.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/import_file.h"
 #include "tools/import/meshes/mesh_tensors.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 
@@ -32,39 +30,26 @@ namespace {
 using Ints = std::vector<int>;
 using Grid = vtkSmartPointer<vtkUnstructuredGrid>;
 
-TEST(VtkSourceTest, XmlFilesOfEveryEncoding) {
+TEST(VtkSourceTest, FilesOfEveryEncoding) {
   const TemporaryFolder folder;
+  constexpr double exact = 0x1p-1000;
   for (const auto& [ending, written] : data_sets()) {
+    SCOPED_TRACE(ending);
+    const auto expect_read = [&, &set = *written](const std::filesystem::path& path, double tolerance) {
+      const auto read = read_vtk_source(path);
+      EXPECT_TRUE(read->IsA(set.GetClassName())) << read->GetClassName();
+      expect_same(*read, set, tolerance);
+      return std::string(read->GetClassName());
+    };
     for (const Mode mode : {Mode::ascii, Mode::binary, Mode::raw_compressed, Mode::raw_plain}) {
-      SCOPED_TRACE(ending);
       write_xml(*written, folder / ("file" + ending), mode);
-      const auto read = read_vtk_source(folder / ("file" + ending));
-      EXPECT_STREQ(read->GetClassName(), written->GetClassName());
-      expect_same(*read, *written, mode == Mode::ascii ? 1e-9 : 0x1p-1000);
+      EXPECT_EQ(expect_read(folder / ("file" + ending), mode == Mode::ascii ? 1e-9 : exact), written->GetClassName());
     }
-  }
-}
-
-TEST(VtkSourceTest, LegacyFiles) {
-  const TemporaryFolder folder;
-  for (const auto& [ending, written] : data_sets()) {
     for (const bool binary : {false, true}) {
-      SCOPED_TRACE(ending);
       write_legacy(*written, folder / "file.vtk", binary);
-      const auto read = read_vtk_source(folder / "file.vtk");
-      EXPECT_TRUE(read->IsA(written->GetClassName())) << read->GetClassName();
-      expect_same(*read, *written, binary ? 0x1p-1000 : 1e-5);  // VTK writes ASCII with six or more digits
+      expect_read(folder / "file.vtk", binary ? exact : 1e-5);  // VTK writes ASCII with six or more digits
     }
   }
-}
-
-std::string pieces_text(const std::string& kind, const std::string& whole, const std::string& pieces) {
-  return "<VTKFile type=\"" + kind + "\" version=\"0.1\" byte_order=\"LittleEndian\">\n<" + kind +
-         " GhostLevel=\"0\" " + whole +
-         ">\n<PPointData><PDataArray type=\"Float64\" Name=\"tensor\" NumberOfComponents=\"9\"/></PPointData>\n" +
-         "<PCellData><PDataArray type=\"Float64\" Name=\"rate\" NumberOfComponents=\"3\"/></PCellData>\n" +
-         "<PPoints><PDataArray type=\"Float64\" NumberOfComponents=\"3\"/></PPoints>\n" + pieces + "</" + kind +
-         ">\n</VTKFile>\n";
 }
 
 TEST(VtkSourceTest, UnstructuredPiecesAreMergedAndGhostCellsRemoved) {
@@ -75,7 +60,10 @@ TEST(VtkSourceTest, UnstructuredPiecesAreMergedAndGhostCellsRemoved) {
   write_xml(*first, folder / "p0.vtu");
   write_xml(*second, folder / "p1.vtu");
   write_bytes(folder / "all.pvtu",
-              pieces_text("PUnstructuredGrid", "", "<Piece Source=\"p0.vtu\"/><Piece Source=\"p1.vtu\"/>\n"));
+              "<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\"><PUnstructuredGrid "
+              "GhostLevel=\"0\"><PPointData><PDataArray type=\"Float64\" Name=\"tensor\" NumberOfComponents=\"9\"/>"
+              "</PPointData><PPoints><PDataArray type=\"Float64\" NumberOfComponents=\"3\"/></PPoints>"
+              "<Piece Source=\"p0.vtu\"/><Piece Source=\"p1.vtu\"/></PUnstructuredGrid></VTKFile>\n");
   const auto read = read_vtk_source(folder / "all.pvtu");
   EXPECT_EQ(read->GetNumberOfCells(), 5);
   EXPECT_EQ(read->GetNumberOfPoints(), 24);
@@ -85,10 +73,10 @@ TEST(VtkSourceTest, UnstructuredPiecesAreMergedAndGhostCellsRemoved) {
   }
 
   std::filesystem::remove(folder / "p1.vtu");
-  EXPECT_NE(read_error(folder / "all.pvtu").find("p1.vtu is missing"), std::string::npos);
+  EXPECT_THAT(read_error(folder / "all.pvtu"), HasSubstr("p1.vtu is missing"));
   write_xml(*image(), folder / "image.vti");
   std::filesystem::rename(folder / "image.vti", folder / "p1.vtu");
-  EXPECT_NE(read_error(folder / "all.pvtu").find("p1.vtu: "), std::string::npos);
+  EXPECT_THAT(read_error(folder / "all.pvtu"), HasSubstr("p1.vtu: "));
 }
 
 TEST(VtkSourceTest, ExodusMeshIsNotMovedByItsArrays) {
@@ -116,17 +104,18 @@ TEST(VtkSourceTest, OpenFoamCase) {
     ASSERT_EQ(read->GetNumberOfCells(), OpenFoamCase::cells);
     ASSERT_EQ(read->GetNumberOfPoints(), 27);
     EXPECT_TRUE(Eigen::Vector3d(read->GetPoint(26)).isApprox(Eigen::Vector3d(2, 1, 4)));
-    const int symmetric[6] = {0, 3, 5,
-                              1, 4, 2};  // indices of VTK's xx yy zz xy yz xz among OpenFOAM's xx xy xz yy yz zz
-    for (int cell = 0; cell < OpenFoamCase::cells; ++cell) {
-      vtkCellData& data = *read->GetCellData();
-      for (int c = 0; c < 9; ++c)
+    const int symmetric[6] = {0, 3, 5, 1, 4, 2};  // VTK's xx yy zz xy yz xz among OpenFOAM's xx xy xz yy yz zz.
+    vtkCellData& data = *read->GetCellData();
+    for (int cell = 0; cell < OpenFoamCase::cells; ++cell)
+      for (int c = 0; c < 9; ++c) {
         EXPECT_EQ(data.GetArray("gradU")->GetComponent(cell, c), OpenFoamCase::value(cell, c, 1));
-      for (int c = 0; c < 6; ++c) {
-        EXPECT_EQ(data.GetArray("sigma")->GetComponent(cell, c), OpenFoamCase::value(cell, symmetric[c], 1));
+        if (c < 6) {
+          EXPECT_EQ(data.GetArray("sigma")->GetComponent(cell, c), OpenFoamCase::value(cell, symmetric[c], 1));
+        }
+        if (c < 3) {
+          EXPECT_EQ(data.GetArray("U")->GetComponent(cell, c), OpenFoamCase::value(cell, c, 1));
+        }
       }
-      for (int c = 0; c < 3; ++c) EXPECT_EQ(data.GetArray("U")->GetComponent(cell, c), OpenFoamCase::value(cell, c, 1));
-    }
     // The components' names tell the order. The order of OpenFOAM's own files is refused.
     const ArrayChoice sigma{"sigma", true};
     const auto tensors = with_tensors(*read, sigma, Take::tensor, {});
@@ -146,17 +135,17 @@ TEST(VtkSourceTest, OpenFoamCase) {
 TEST(VtkSourceTest, IncompleteOpenFoamCases) {
   const TemporaryFolder folder;
   const auto error = [&] { return read_error(folder); };
-  EXPECT_NE(error().find("controlDict is missing"), std::string::npos);
+  EXPECT_THAT(error(), HasSubstr("controlDict is missing"));
   OpenFoamCase::write(folder);
   std::filesystem::rename(folder / "constant/polyMesh/owner", folder / "owner");
-  EXPECT_NE(error().find("owner: is missing"), std::string::npos);
+  EXPECT_THAT(error(), HasSubstr("owner: is missing"));
   std::filesystem::rename(folder / "owner", folder / "constant/polyMesh/owner");
   std::filesystem::remove_all(folder / "0");
   std::filesystem::remove_all(folder / "0.5");
-  EXPECT_NE(error().find("time"), std::string::npos);
+  EXPECT_THAT(error(), HasSubstr("time"));
   std::filesystem::create_directories(folder / "processor0");
   std::filesystem::remove_all(folder / "constant");
-  EXPECT_NE(error().find("has no mesh"), std::string::npos);
+  EXPECT_THAT(error(), HasSubstr("has no mesh"));
 }
 
 // Polyhedra as VTK 9.4 writes them: in four arrays of faces.
@@ -194,12 +183,7 @@ Grid mixed_bar() {
 }
 
 void expect_linear(const std::filesystem::path& path, std::size_t voxels) {
-  ImportSettings settings;
-  settings.files = {path};
-  settings.array = "tensor";
-  settings.sampling.resolution = 0.25;
-  ImportReport report;
-  const TensorGrid grid = import_tensors(settings, Progress(), report);
+  const TensorGrid grid = imported(path, array_settings("tensor", Take::tensor, 0.25)).grid;
   EXPECT_EQ(grid.active_voxels(), voxels);
   mesh_fixtures::for_each_voxel(grid, [](const Eigen::Vector3d& x, const Eigen::Matrix3d& tensor) {
     EXPECT_NEAR(tensor(1, 2), number(x.data(), 5), 1e-4) << x.transpose();
@@ -257,9 +241,7 @@ TEST(Polyhedra, OfVtkHdfAreReadOfEachPart) {
       ends.insert(ends.begin(), 0);
       return ends;
     };
-    file.group("/VTKHDF");
-    file.attribute("/VTKHDF", "Version", std::vector<double>{2, 5});
-    file.attribute("/VTKHDF", "Type", "UnstructuredGrid");
+    file.begin_vtk("UnstructuredGrid", {2, 5});
     twice("NumberOfPoints", {12});
     twice("NumberOfCells", {2});
     twice("NumberOfConnectivityIds", {16});
@@ -285,8 +267,6 @@ TEST(Polyhedra, OfVtkHdfAreReadOfEachPart) {
   expect_linear(folder / "a.vtkhdf", 17 * 5 * 5);
 }
 
-constexpr std::array<cgsize_t, 3> points{3, 4, 5};
-
 /// A number that tells positions, components and steps of time apart.
 double velocity(const double* p, int component, int step) {
   return (component + 1) * p[0] + 10 * p[1] - (component + 2) * p[2] + 100 * step;
@@ -294,35 +274,44 @@ double velocity(const double* p, int component, int step) {
 
 void check(int error) { ASSERT_EQ(error, CG_OK) << cg_get_error(); }
 
+/// `value(position)` at the 3 x 4 x 5 points of a zone, or at the centres of its cells.
+template <class Value>
+std::vector<double> zone_values(double first_x, bool of_cells, const Value& value) {
+  const int nx = of_cells ? 2 : 3, ny = of_cells ? 3 : 4, nz = of_cells ? 4 : 5;
+  const double shift = of_cells ? 0.5 : 0;
+  std::vector<double> values;
+  for (int i = 0; i < nx * ny * nz; ++i) {
+    const double p[3] = {first_x + i % nx + shift, 0.5 * (i / nx % ny + shift), 0.25 * (i / nx / ny + shift)};
+    values.push_back(value(p));
+  }
+  return values;
+}
+
+/// A solution with the velocity of a step at points or at cells.
+void write_solution(int file, int base, int zone, const std::string& name, double first_x, bool of_cells, int step) {
+  int solution = 0, id = 0;
+  check(
+      cg_sol_write(file, base, zone, name.c_str(), of_cells ? CGNS_ENUMV(CellCenter) : CGNS_ENUMV(Vertex), &solution));
+  for (int c = 0; c < 3; ++c)
+    check(cg_field_write(
+        file, base, zone, solution, CGNS_ENUMV(RealDouble), (std::string("Velocity") + "XYZ"[c]).c_str(),
+        zone_values(first_x, of_cells, [=](const double* p) { return velocity(p, c, step); }).data(), &id));
+}
+
 void write_zone(int file, int base, const std::string& name, double first_x, int steps) {
-  const std::array<cgsize_t, 9> size{points[0], points[1], points[2], points[0] - 1, points[1] - 1, points[2] - 1};
-  int zone = 0, id = 0, solution = 0;
+  const std::array<cgsize_t, 9> size{3, 4, 5, 2, 3, 4};
+  int zone = 0, id = 0;
   check(cg_zone_write(file, base, name.c_str(), size.data(), CGNS_ENUMV(Structured), &zone));
-  /// The values at all points.
-  const auto values_of = [&](const auto& value) {
-    std::vector<double> values;
-    for (cgsize_t i = 0; i < points[0] * points[1] * points[2]; ++i) {
-      const double p[3] = {first_x + static_cast<double>(i % points[0]),
-                           0.5 * static_cast<double>(i / points[0] % points[1]),
-                           0.25 * static_cast<double>(i / points[0] / points[1])};
-      values.push_back(value(p));
-    }
-    return values;
-  };
   for (int axis = 0; axis < 3; ++axis)
     check(cg_coord_write(file, base, zone, CGNS_ENUMV(RealDouble), (std::string("Coordinate") + "XYZ"[axis]).c_str(),
-                         values_of([axis](const double* p) { return p[axis]; }).data(), &id));
+                         zone_values(first_x, false, [axis](const double* p) { return p[axis]; }).data(), &id));
   std::string solutions;
   for (int step = 0; step < steps; ++step) {
     const std::string of_step = "Solution" + std::to_string(step);
     solutions += of_step + std::string(32 - of_step.size(), ' ');
-    check(cg_sol_write(file, base, zone, of_step.c_str(), CGNS_ENUMV(Vertex), &solution));
-    for (int c = 0; c < 3; ++c)
-      check(cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealDouble),
-                           (std::string("Velocity") + "XYZ"[c]).c_str(),
-                           values_of([=](const double* p) { return velocity(p, c, step); }).data(), &id));
+    write_solution(file, base, zone, of_step, first_x, false, step);
   }
-  if (steps == 1) return;
+  if (steps == 1) return write_solution(file, base, zone, "OfCells", first_x, true, 0);
   const std::array<cgsize_t, 2> shape{32, steps};
   check(cg_ziter_write(file, base, zone, "ZoneIterativeData"));
   check(cg_goto(file, base, "Zone_t", zone, "ZoneIterativeData_t", 1, "end"));
@@ -351,19 +340,26 @@ void expect_velocity(vtkDataSet& data, int step) {
   EXPECT_EQ(data.GetNumberOfPoints(), 5 * 4 * 5);  // The points where zones meet are merged.
   EXPECT_EQ(data.GetNumberOfCells(), 4 * 3 * 4);
   vtkDataArray* const read = data.GetPointData()->GetArray("Velocity");
-  ASSERT_NE(read, nullptr);
-  ASSERT_EQ(read->GetNumberOfComponents(), 3);
+  ASSERT_TRUE(read && read->GetNumberOfComponents() == 3);
   for (vtkIdType i = 0; i < data.GetNumberOfPoints(); ++i)
     for (int component = 0; component < 3; ++component)
       EXPECT_EQ(read->GetComponent(i, component), velocity(data.GetPoint(i), component, step));
 }
 
-TEST(Cgns, ZonesAreOneMeshInBothFormats) {
+TEST(Cgns, ZonesAreOneMeshInBothFormatsWithValuesAtPointsAndCells) {
   const TemporaryFolder folder;
   for (const int type : {CG_FILE_ADF, CG_FILE_HDF5}) {
     write_cgns(folder / "a.cgns", type, 1);
     EXPECT_EQ(time_steps(folder / "a.cgns"), 1);
-    expect_velocity(*read_vtk_source(folder / "a.cgns"), 0);
+    const auto read = read_vtk_source(folder / "a.cgns");
+    expect_velocity(*read, 0);
+    vtkDataArray* const of_cells = read->GetCellData()->GetArray("Velocity");
+    ASSERT_TRUE(of_cells && of_cells->GetNumberOfComponents() == 3);
+    for (vtkIdType i = 0; i < read->GetNumberOfCells(); ++i)
+      for (int c = 0; c < 3; ++c) {
+        const Eigen::Vector3d centre = mesh_fixtures::middle_of(*read->GetCell(i));
+        EXPECT_EQ(of_cells->GetComponent(i, c), velocity(centre.data(), c, 0));
+      }
     std::filesystem::remove(folder / "a.cgns");
   }
 }
@@ -381,10 +377,10 @@ TEST(Cgns, HasStepsOfTime) {
 TEST(Cgns, DamageIsOneLine) {
   const TemporaryFolder folder;
   write_bytes(folder / "none.cgns", "no CGNS");
-  EXPECT_NE(read_error(folder / "none.cgns").find("none.cgns"), std::string::npos);
+  EXPECT_THAT(read_error(folder / "none.cgns"), HasSubstr("none.cgns"));
   write_cgns(folder / "a.cgns", CG_FILE_HDF5, 1);
   std::filesystem::resize_file(folder / "a.cgns", std::filesystem::file_size(folder / "a.cgns") / 2);
-  EXPECT_NE(read_error(folder / "a.cgns").find("a.cgns"), std::string::npos);
+  EXPECT_THAT(read_error(folder / "a.cgns"), HasSubstr("a.cgns"));
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <functional>
 #include <random>
 
-#include "tests/names.h"
+#include "tests/volumes/grid_support.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/tensor_grid.h"
 #include "volumes/sampling/tensor_sampler.h"
@@ -103,19 +103,27 @@ Matrix3d noise(std::mt19937& random) {
 TensorGrid masked_grid(const AlignedBox3i& box, const std::function<bool(const Vector3i&)>& is_active,
                        const std::function<Matrix3d(const Vector3i&)>& value) {
   TensorGrid grid = dense_grid(box, Eigen::Affine3d::Identity(), value);
-  for (TensorBlock& block : grid.blocks)
-    for (int i = 0; i < TensorBlock::voxels; ++i)
-      if (block.active[i] && !is_active(block.origin + TensorBlock::position(i))) {
-        block.active[i] = false;
-        block.values[static_cast<std::size_t>(i)].setZero();
-      }
-  remove_empty_blocks(grid);
+  clear_voxels(grid.blocks, [&](const Vector3i& index) { return !is_active(index); });
   return grid;
+}
+
+const AlignedBox3i cube_of_32(Vector3i::Zero(), Vector3i(31, 31, 31));
+const Vector3d ball_centre = Vector3d::Constant(15.3);
+
+bool is_in_ball(const Vector3i& voxel) { return (voxel.cast<double>() - ball_centre).norm() < 12; }
+
+Matrix3d ones(const Vector3i&) { return Matrix3d::Constant(1); }
+
+/// Calls visit(index) at voxels and half-way between them, about the ball.
+template <class Visit>
+void visit_halves(const Visit& visit) {
+  for (int x = 8; x < 54; ++x)
+    for (int y = 8; y < 54; ++y)
+      for (int z = 8; z < 54; ++z) visit(Vector3d(x, y, z) / 2);
 }
 
 /// A dense field of any values has them at its voxels.
 TEST(CubicField, InterpolatesItsVoxels) {
-  std::mt19937 random(3);
   const TensorGrid grid =
       dense_grid(AlignedBox3i(Vector3i(-5, 1, 6), Vector3i(12, 20, 22)), sheared(), [](auto& index) {
         std::mt19937 own(static_cast<unsigned>(index.dot(Vector3i(1, 100, 10000)) + 1000000));
@@ -123,59 +131,44 @@ TEST(CubicField, InterpolatesItsVoxels) {
       });
   const TensorField field(grid, fading);
   TensorSampler sampler(field);
-  for (const TensorBlock& block : grid.blocks)
-    for (int i = 0; i < TensorBlock::voxels; ++i) {
-      if (!block.active[i]) continue;
-      const Vector3d at = grid.to_world * (block.origin + TensorBlock::position(i)).cast<double>();
-      const Matrix3d expected = block.values[static_cast<std::size_t>(i)].cast<double>();
-      ASSERT_LT((sampler.at(at) - expected).norm(), 3e-5);  // White noise: coefficients are up to ten times as large.
-    }
+  for_each_active(grid, [&](const Vector3i& index, const Matrix3f& value) {
+    const Matrix3d found = sampler.at(grid.to_world * index.cast<double>());
+    ASSERT_LT((found - value.cast<double>()).norm(), 3e-5);  // White noise: coefficients are up to ten times as large.
+  });
 }
 
 /// The same beside a body of any shape: its voxels keep their values, and nothing is far from 0 and 1 but beside edges.
 TEST(CubicField, ABallHardlyRings) {
-  const AlignedBox3i box(Vector3i::Zero(), Vector3i(31, 31, 31));
-  const Vector3d centre = Vector3d::Constant(15.3);
-  const auto one = [](const Vector3i&) { return Matrix3d(Matrix3d::Constant(1)); };
-  const auto within = [&](const Vector3i& v) { return (v.cast<double>() - centre).norm() < 12; };
-  const TensorField field(masked_grid(box, within, one), fading);
+  const TensorField field(masked_grid(cube_of_32, is_in_ball, ones), fading);
   TensorSampler sampler(field);
   int far_from = 0, count = 0;
-  for (int x = 8; x < 54; ++x)
-    for (int y = 8; y < 54; ++y)
-      for (int z = 8; z < 54; ++z) {
-        const Vector3i half(x, y, z);
-        const double value = sampler.at(half.cast<double>() / 2)(0, 1);
-        EXPECT_GT(value, -0.3);
-        EXPECT_LT(value, 1.2);
-        far_from += value < -0.1 || value > 1.1;
-        ++count;
-        if ((half.array() / 2 * 2 == half.array()).all() && within(half / 2)) {
-          EXPECT_NEAR(value, 1, 2e-4);
-        }
-      }
+  visit_halves([&](const Vector3d& at) {
+    const double value = sampler.at(at)(0, 1);
+    EXPECT_GT(value, -0.3);
+    EXPECT_LT(value, 1.2);
+    far_from += value < -0.1 || value > 1.1;
+    ++count;
+    const Vector3i voxel = at.cast<int>();
+    if (voxel.cast<double>() == at && is_in_ball(voxel)) {
+      EXPECT_NEAR(value, 1, 2e-4);
+    }
+  });
   EXPECT_LT(far_from, 0.02 * count);
 }
 
 /// A field that is linear goes on behind the last voxels of a body.
 TEST(CubicField, ExtendContinuesLines) {
-  const AlignedBox3i box(Vector3i::Zero(), Vector3i(31, 31, 31));
-  const Vector3d centre = Vector3d::Constant(15.3);
   const auto line = [](const Vector3d& index) {
     return Matrix3d((0.2 + 0.02 * index.x() - 0.03 * index.y() + 0.01 * index.z()) * Matrix3d::Constant(1));
   };
-  const auto within = [&](const Vector3i& v) { return (v.cast<double>() - centre).norm() < 12; };
-  const TensorField field(masked_grid(box, within, [&](const Vector3i& v) { return line(v.cast<double>()); }),
-                          extending);
+  const TensorField field(
+      masked_grid(cube_of_32, is_in_ball, [&](const Vector3i& v) { return line(v.cast<double>()); }), extending);
   TensorSampler sampler(field);
-  for (int x = 8; x < 54; ++x)
-    for (int y = 8; y < 54; ++y)
-      for (int z = 8; z < 54; ++z) {
-        const Vector3d at = Vector3d(x, y, z) / 2;
-        if ((at - centre).norm() < 12.4) {
-          EXPECT_LT((sampler.at(at) - line(at)).norm(), 1e-4) << at.transpose();
-        }
-      }
+  visit_halves([&](const Vector3d& at) {
+    if ((at - ball_centre).norm() < 12.4) {
+      EXPECT_LT((sampler.at(at) - line(at)).norm(), 1e-4) << at.transpose();
+    }
+  });
 }
 
 /// Layers of one to four voxels at a face of the extent, and another body far away: voxels keep their values.
@@ -188,8 +181,7 @@ TEST(CubicField, ThinLayersAtFacesKeepTheirValues) {
           const int x = is_last ? 23 - v.x() : v.x();
           return x < layer || x > 18;
         };
-        const auto one = [](const Vector3i&) { return Matrix3d(Matrix3d::Constant(1)); };
-        const TensorField field(masked_grid(box, within, one), interpolant);
+        const TensorField field(masked_grid(box, within, ones), interpolant);
         TensorSampler sampler(field);
         for (int x = 0; x < 24; ++x)
           if (within({x, 5, 5})) {
@@ -211,24 +203,6 @@ TEST(CubicField, TheBoundHoldsForValuesOfAnySize) {
                                        }),
                             fading);
     EXPECT_GT(field.brick({0, 0, 0}).strongest, large);
-  }
-}
-
-TEST(CubicField, NoDeviatorExceedsTheBoundOfItsBrick) {
-  const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(17, 17, 17)), sheared(),
-                                     [](auto& index) {
-                                       std::mt19937 own(static_cast<unsigned>(index.dot(Vector3i(1, 100, 10000))));
-                                       return noise(own);
-                                     }),
-                          fading);
-  TensorSampler sampler(field);
-  std::mt19937 random(1);
-  std::uniform_real_distribution<double> uniform(0, 17);
-  for (int i = 0; i < 1000; ++i) {
-    const Vector3d index(uniform(random), uniform(random), uniform(random));
-    const Matrix3d T = sampler.at(field.to_world() * index);
-    const Vector3i brick = (index / 8).cast<int>();
-    EXPECT_LE((T - T.trace() / 3 * Matrix3d::Identity()).norm(), field.brick(brick).strongest);
   }
 }
 

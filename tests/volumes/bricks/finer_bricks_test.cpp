@@ -2,9 +2,7 @@
 
 #include <cmath>
 #include <random>
-#include <vector>
 
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include "tests/volumes/grid_support.h"
@@ -14,12 +12,6 @@
 
 namespace tensorray {
 namespace {
-
-using Eigen::AlignedBox3d;
-using Eigen::AlignedBox3i;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 constexpr Interpolant smooth_fade{Interpolation::cubic, Border::fade},
     smooth_extend{Interpolation::cubic, Border::extend};
@@ -71,6 +63,7 @@ const AlignedBox3i three_bricks(Vector3i(0, 0, 0), Vector3i(24, 24, 24));
 std::vector<RefinedCase> refined_cases() {
   const auto corner = [](const Vector3i& b) { return b == Vector3i(0, 0, 0) || b == Vector3i(1, 1, 1); };
   return {
+      {"one level", {Vector3i(0, 0, 0), Vector3i(17, 17, 17)}, 1, [](const Vector3i&) { return true; }},
       {"one brick in the middle", three_bricks, 2, [](const Vector3i& b) { return b == Vector3i(1, 1, 1); }},
       {"half", three_bricks, 3, [](const Vector3i& b) { return b.x() == 0; }},
       {"all", three_bricks, 2, [](const Vector3i&) { return true; }},
@@ -124,22 +117,26 @@ TEST_P(RefinedFields, CubicPolynomialsAreReproduced) {
   }
 }
 
-/// Across a face between levels, value, slopes and curvature go on: the one-sided differences of slopes agree.
-TEST_P(RefinedFields, RandomDetailsAreTwiceContinuouslyDifferentiable) {
-  const RefinedCase& c = GetParam();
+/// White noise at the voxels of all levels.
+TensorGrid noise_of_levels(const RefinedCase& c) {
   std::mt19937 random(2);
   TensorGrid grid = grid_of_levels(c.box, c.levels, c.refines, [&](const Vector3d&) { return Matrix3d::Zero(); });
   for (TensorBlocks* blocks : levels_of(grid))
     for (TensorBlock& block : *blocks)
       for (int offset = 0; offset < TensorBlock::voxels; ++offset)
         if (block.active[offset]) block.values[offset] = random_tensor(random).cast<float>();
-  const TensorField field(grid, smooth_fade);
+  return grid;
+}
+
+/// Across a face between levels, value, slopes and curvature go on: the one-sided differences of slopes agree.
+TEST_P(RefinedFields, RandomDetailsAreTwiceContinuouslyDifferentiable) {
+  const RefinedCase& c = GetParam();
+  const TensorField field(noise_of_levels(c), smooth_fade);
   TensorSampler sampler(field);
-  std::uniform_real_distribution<double> uniform(0, 1);
+  std::mt19937 random(2);
   const double near = 1e-4, scale = std::pow(2, field.levels() - 1);
   for (int n = 0; n < 2000; ++n) {  // On the faces of the finest voxels, and across them.
-    Vector3d index = c.box.min().cast<double>();
-    for (int axis = 0; axis < 3; ++axis) index[axis] += uniform(random) * c.box.sizes()[axis];
+    Vector3d index = random_point(random, c.box.cast<double>());
     const int axis = n % 3;
     index[axis] = n % 2 ? std::round(index[axis] / 4) * 4 : std::round(scale * index[axis]) / scale;
     if (index[axis] <= c.box.min()[axis] || index[axis] >= c.box.max()[axis]) continue;
@@ -177,13 +174,11 @@ void visit_finest(const TensorGrid& grid, const AlignedBox3i& box, int margin, c
 
 TEST_P(RefinedFields, DeviatorsAreBounded) {
   const RefinedCase& c = GetParam();
-  const TensorField field(grid_of_levels(c.box, c.levels, c.refines, wavy), smooth_fade);
+  const TensorField field(noise_of_levels(c), smooth_fade);
   TensorSampler sampler(field);
   std::mt19937 random(3);
-  std::uniform_real_distribution<double> uniform(0, 1);
   for (int n = 0; n < 1000; ++n) {
-    Vector3d index = c.box.min().cast<double>();
-    for (int axis = 0; axis < 3; ++axis) index[axis] += uniform(random) * c.box.sizes()[axis];
+    const Vector3d index = random_point(random, c.box.cast<double>());
     const Vector3i brick = (index / 8).array().floor().cast<int>();
     const Eigen::Vector3f from = (index - 8 * brick.cast<double>()).cast<float>();
     const LeafBrick leaf = field.leaf(brick, {from.x(), from.y(), from.z()});
@@ -276,9 +271,7 @@ TEST(FinerBricks, TheErrorIsOfFourthOrderInTheLocalVoxel) {
 
 TEST(FinerBricks, LevelsWithoutDetailsChangeNothing) {
   const AlignedBox3i box(Vector3i(0, 0, 0), Vector3i(20, 17, 16));
-  std::mt19937 random(7);
-  const TensorGrid coarse =
-      dense_grid(box, Eigen::Affine3d::Identity(), [&](const Vector3i& index) { return waves(index); });
+  const TensorGrid coarse = dense_grid(box, Eigen::Affine3d::Identity(), waves);
   const TensorField alone(coarse, smooth_fade);
   TensorGrid grid = coarse;
   for (int level = 1; level < 3; ++level)
@@ -288,9 +281,9 @@ TEST(FinerBricks, LevelsWithoutDetailsChangeNothing) {
   const TensorField field(grid, smooth_fade);
   EXPECT_EQ(field.levels(), 3);
   TensorSampler sampler(field), before(alone);
-  std::uniform_real_distribution<double> uniform(0, 1);
+  std::mt19937 random(7);
   for (int n = 0; n < 1000; ++n) {
-    const Vector3d index(20 * uniform(random), 17 * uniform(random), 16 * uniform(random));
+    const Vector3d index = random_point(random, box.cast<double>());
     EXPECT_LT((sampler.at(index) - before.at(index)).norm(), rounding_of_levels);
   }
 }
@@ -300,16 +293,10 @@ TEST(FinerBricks, InactiveVoxelsAreContinuedAtTheirLevel) {
   const AlignedBox3i box(Vector3i(0, 0, 0), Vector3i(24, 12, 12));
   const auto line = [](const Vector3d& at) { return Matrix3d((1 + at.x() / 10) * Matrix3d::Ones()); };
   TensorGrid grid = grid_of_levels(box, 2, first_half, line);
-  for (std::size_t level = 0; level < 2; ++level)
-    for (TensorBlock& block : *levels_of(grid)[level])
-      for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
-        const int x = block.origin.x() + TensorBlock::position(offset).x();
-        if (x * (2 - static_cast<int>(level)) <= 21 || (level == 0 && x == 24))
-          continue;  // Inactive from 10.6 on, but for the end.
-        block.active.reset(static_cast<std::size_t>(offset));
-        block.values[static_cast<std::size_t>(offset)].setZero();
-      }
-  remove_empty_blocks(grid);
+  for (int level = 0; level < 2; ++level)
+    clear_voxels(*levels_of(grid)[level], [&](const Vector3i& index) {  // From 10.6 on, but for the end.
+      return index.x() * (2 - level) > 21 && (level > 0 || index.x() != 24);
+    });
   const TensorField extended(grid, smooth_extend), faded(grid, smooth_fade);
   TensorSampler extend(extended), fade(faded);
   for (const double x : {2.0, 9.3, 10.0, 10.4, 10.5, 10.9}) {

@@ -4,7 +4,7 @@
 #include <limits>
 #include <random>
 
-#include "tests/names.h"
+#include "tests/volumes/grid_support.h"
 #include "volumes/bricks/brick_layout.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/block_source.h"
@@ -83,12 +83,9 @@ TEST(SymmetricBricks, HoldTheSameTensors) {
   expect_same(symmetric, general);
 
   std::mt19937 random(2);
-  std::uniform_real_distribution<double> uniform(0, 1);
   TensorSampler one(symmetric), other(general);
   for (int i = 0; i < 1000; ++i) {
-    Vector3d world;
-    for (int axis = 0; axis < 3; ++axis)
-      world[axis] = symmetric.voxels().min()[axis] + uniform(random) * symmetric.voxels().sizes()[axis];
+    const Vector3d world = random_point(random, symmetric.voxels().cast<double>());
     EXPECT_TRUE(same(one.at(world), other.at(world))) << world.transpose();
     Eigen::Matrix<double, 3, 2> along;
     along << Vector3d(0.5, -1, 2), Vector3d(1, 0.25, 0);

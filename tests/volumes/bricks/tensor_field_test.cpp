@@ -3,7 +3,7 @@
 #include <limits>
 #include <random>
 
-#include "tests/names.h"
+#include "tests/volumes/grid_support.h"
 #include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/brick_layout.h"
 #include "volumes/sampling/tensor_sampler.h"
@@ -11,7 +11,14 @@
 namespace tensorray {
 namespace {
 
-Eigen::AlignedBox3i box(const Vector3i& min, const Vector3i& max) { return {min, max}; }
+/// Voxels from index `min` to `max`, of edge 1.
+TensorGrid voxels(const Vector3i& min, const Vector3i& max, const std::function<Matrix3d(const Vector3i&)>& value) {
+  return dense_grid({min, max}, Eigen::Affine3d::Identity(), value);
+}
+
+Matrix3d identity(const Vector3i&) { return Matrix3d::Identity(); }
+
+Matrix3d x_times_identity(const Vector3i& index) { return index.x() * Matrix3d::Identity(); }
 
 /// Linear along each axis, but not in all together: trilinear interpolation reproduces it exactly.
 Matrix3d trilinear(const Vector3d& p) {
@@ -30,30 +37,22 @@ Eigen::Affine3d oblique() {
   return transform;
 }
 
-std::vector<Vector3d> points_in(const Eigen::AlignedBox3d& extent, int count) {
-  std::mt19937 random(1);
-  std::uniform_real_distribution<double> uniform(0, 1);
-  std::vector<Vector3d> points;
-  for (int i = 0; i < count; ++i)
-    points.push_back(extent.min() +
-                     Vector3d(uniform(random), uniform(random), uniform(random)).cwiseProduct(extent.sizes()));
-  return points;
-}
-
 TEST(TensorField, InterpolatesTrilinearFunctionsExactlyAcrossBricks) {
-  const auto index_box = box({-11, -3, 5}, {9, 14, 30});  // Several bricks, negative indices, no multiple of 8.
-  const TensorGrid grid =
-      dense_grid(index_box, oblique(), [](const Vector3i& i) { return trilinear(i.cast<double>() / 8); });
+  const AlignedBox3i box(Vector3i(-11, -3, 5),
+                         Vector3i(9, 14, 30));  // Several bricks, negative indices, no multiple of 8.
+  const TensorGrid grid = dense_grid(box, oblique(), [](const Vector3i& i) { return trilinear(i.cast<double>() / 8); });
   const TensorField field(grid);
   TensorSampler sampler(field);
-  for (const Vector3d& index : points_in(field.index_bounds(), 2000))
+  std::mt19937 random(1);
+  for (int i = 0; i < 2000; ++i) {
+    const Vector3d index = random_point(random, field.index_bounds());
     EXPECT_LT((sampler.at(oblique() * index) - trilinear(index / 8)).norm(), 1e-5 * trilinear(index / 8).norm());
+  }
   EXPECT_EQ(sampler.samples(), 2000u);
 }
 
 TEST(TensorField, InactiveVoxelsCountAsZero) {
-  TensorGrid grid = dense_grid(box({0, 0, 0}, {2, 2, 2}), Eigen::Affine3d::Identity(),
-                               [](const Vector3i&) { return Matrix3d::Identity(); });
+  TensorGrid grid = voxels({0, 0, 0}, {2, 2, 2}, identity);
   const int middle = TensorBlock::offset(1, 1, 1);
   grid.blocks[0].active.reset(middle);
   grid.blocks[0].values[middle].setZero();
@@ -65,8 +64,7 @@ TEST(TensorField, InactiveVoxelsCountAsZero) {
 }
 
 TEST(TensorField, ASingleVoxelAcrossIsOneVoxelThick) {
-  const TensorField field(dense_grid(box({0, 5, 0}, {9, 5, 9}), Eigen::Affine3d::Identity(),
-                                     [](const Vector3i& i) { return Matrix3d(i.x() * Matrix3d::Identity()); }));
+  const TensorField field(voxels({0, 5, 0}, {9, 5, 9}, x_times_identity));
   EXPECT_EQ(field.index_bounds().min().y(), 4.5);
   EXPECT_EQ(field.index_bounds().max().y(), 5.5);
   TensorSampler sampler(field);
@@ -80,10 +78,7 @@ TEST(TensorField, ASingleVoxelAcrossIsOneVoxelThick) {
 }
 
 TEST(TensorField, MemoryFollowsActiveVoxelsNotTheExtent) {
-  const auto cluster = [](int at) {
-    return dense_grid(box(Vector3i::Constant(at), Vector3i::Constant(at + 7)), Eigen::Affine3d::Identity(),
-                      [](const Vector3i&) { return Matrix3d::Identity(); });
-  };
+  const auto cluster = [](int at) { return voxels(Vector3i::Constant(at), Vector3i::Constant(at + 7), identity); };
   TensorGrid grid = cluster(0);
   const TensorGrid far = cluster(1 << 24);
   grid.blocks.insert(grid.blocks.end(), far.blocks.begin(), far.blocks.end());
@@ -96,8 +91,7 @@ TEST(TensorField, MemoryFollowsActiveVoxelsNotTheExtent) {
 }
 
 TEST(TensorField, PointsOutsideAreTakenToTheExtent) {
-  const TensorField field(dense_grid(box({0, 0, 0}, {4, 4, 4}), Eigen::Affine3d::Identity(),
-                                     [](const Vector3i& i) { return Matrix3d(i.x() * Matrix3d::Identity()); }));
+  const TensorField field(voxels({0, 0, 0}, {4, 4, 4}, x_times_identity));
   TensorSampler sampler(field);
   EXPECT_DOUBLE_EQ(sampler.at({9, 2, 2})(0, 0), 4);
   EXPECT_DOUBLE_EQ(sampler.at({-1e300, 2, 2})(0, 0), 0);
@@ -105,7 +99,7 @@ TEST(TensorField, PointsOutsideAreTakenToTheExtent) {
 }
 
 TEST(TensorField, KnowsItsGreatestNorm) {
-  const TensorField field(dense_grid(box({0, 0, 0}, {4, 4, 4}), Eigen::Affine3d::Identity(), [](const Vector3i& i) {
+  const TensorField field(voxels({0, 0, 0}, {4, 4, 4}, [](const Vector3i& i) {
     return Matrix3d((i.sum() == 12 ? -2.5 : 1) * Matrix3d::Identity());
   }));
   EXPECT_NEAR(field.max_norm(), 2.5 * std::sqrt(3.0), 1e-6);
@@ -122,7 +116,7 @@ TEST(TensorField, KnowsTheStrongestDeviatorOfABrickAtAnyScale) {
   std::normal_distribution<double> normal;
   for (const double scale : {1e-37, 1e-30, 1e-20, 1e-13, 1e-6, 1.0, 1e6, 1e14, 1e15, 1e20, 1e37})
     for (const double isotropic : {0.0, 1.0}) {
-      const TensorField field(dense_grid(box({0, 0, 0}, {15, 8, 8}), Eigen::Affine3d::Identity(), [&](const Vector3i&) {
+      const TensorField field(voxels({0, 0, 0}, {15, 8, 8}, [&](const Vector3i&) {
         Matrix3d T = isotropic * Matrix3d::Identity();
         for (int i = 0; i < 9; ++i) T(i / 3, i % 3) += (1 - 0.9 * isotropic) * normal(random);
         return Matrix3d(scale * T);
@@ -140,16 +134,16 @@ TEST(TensorField, KnowsTheStrongestDeviatorOfABrickAtAnyScale) {
 
 TEST(TensorField, BricksThatBendNothingHaveNoDeviator) {
   for (const double value : {0.0, 3.0, 1e-30, 1e38}) {
-    const TensorField field(dense_grid(box({0, 0, 0}, {7, 7, 7}), Eigen::Affine3d::Identity(),
-                                       [&](const Vector3i&) { return Matrix3d(value * Matrix3d::Identity()); }));
+    const TensorField field(
+        voxels({0, 0, 0}, {7, 7, 7}, [&](const Vector3i&) { return Matrix3d(value * Matrix3d::Identity()); }));
     EXPECT_EQ(field.brick({0, 0, 0}).strongest, 0);
   }
 }
 
 TEST(TensorField, WhatIsNotFiniteDoesNotHideTheStrongestDeviator) {
   const float infinity = std::numeric_limits<float>::infinity();
-  TensorGrid grid = dense_grid(box({0, 0, 0}, {7, 7, 7}), Eigen::Affine3d::Identity(),
-                               [](const Vector3i& i) { return Matrix3d(i.x() * Vector3d::UnitX().asDiagonal()); });
+  TensorGrid grid =
+      voxels({0, 0, 0}, {7, 7, 7}, [](const Vector3i& i) { return Matrix3d(i.x() * Vector3d::UnitX().asDiagonal()); });
   grid.blocks[0].values[100].setConstant(std::nanf(""));
   grid.blocks[0].values[200](1, 1) = infinity;
   EXPECT_NEAR(TensorField(grid).brick({0, 0, 0}).strongest, 7 * std::sqrt(2.0 / 3), 1e-3);
@@ -159,15 +153,14 @@ TEST(TensorField, WhatIsNotFiniteDoesNotHideTheStrongestDeviator) {
 
 TEST(TensorField, RefusesWhatCannotBeTraced) {
   EXPECT_THROW(TensorField{TensorGrid{}}, std::invalid_argument);
-  TensorGrid flat = dense_grid(box({0, 0, 0}, {1, 1, 1}), Eigen::Affine3d::Identity(),
-                               [](const Vector3i&) { return Matrix3d::Identity(); });
+  TensorGrid flat = voxels({0, 0, 0}, {1, 1, 1}, identity);
   flat.to_world.linear().col(2).setZero();
   EXPECT_THROW(TensorField{flat}, std::invalid_argument);
 }
 
 TEST(TensorGrid, NonFiniteVoxelsAreRemovedAndCounted) {
   const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
-  TensorGrid grid = dense_grid(box({0, 0, 0}, {9, 0, 0}), Eigen::Affine3d::Identity(), [&](const Vector3i& i) {
+  TensorGrid grid = voxels({0, 0, 0}, {9, 0, 0}, [&](const Vector3i& i) {
     return Matrix3d::Constant(i.x() == 3 ? nan : i.x() >= 8 ? infinity : 1).eval();
   });
   EXPECT_EQ(remove_non_finite(grid), 3u);

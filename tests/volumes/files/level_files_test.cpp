@@ -2,8 +2,6 @@
 
 #include <functional>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
 #include "tests/volumes/file_support.h"
@@ -14,13 +12,6 @@
 
 namespace tensorray {
 namespace {
-
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 TensorGrid three_levels() {
   const Eigen::AlignedBox3i box(Vector3i(-8, 0, 0), Vector3i(16, 11, 8));
@@ -77,16 +68,6 @@ TEST(LevelFiles, LevelsHaveTheirVoxelSize) {
   EXPECT_LT((at("stress_row0@1", {4, 8, -12}) - at("stress_row0", {2, 4, -6})).length(), 1e-9);
 }
 
-struct Damage {
-  const char* name;
-  std::function<void(openvdb::GridPtrVec& grids)> change;
-  const char* message;
-};
-
-void PrintTo(const Damage& damage, std::ostream* out) { *out << damage.name; }
-
-class DamagedLevels : public testing::TestWithParam<Damage> {};
-
 /// Appends the rows of a level, in which `set` sets voxels.
 void add_rows(openvdb::GridPtrVec& grids, int level, double voxel_size,
               const std::function<void(openvdb::Vec3STree& tree)>& set, int count = 3) {
@@ -103,9 +84,14 @@ void fill_from(openvdb::Vec3STree& tree, int first, int last) {
   tree.voxelizeActiveTiles();
 }
 
-std::vector<Damage> damages() {
+TEST(LevelFiles, DamagedLevelsAreRefusedInOneLine) {
+  struct Damage {
+    const char* name;
+    std::function<void(openvdb::GridPtrVec& grids)> change;
+    const char* message;
+  };
   const auto half = [](openvdb::Vec3STree& tree) { fill_from(tree, 0, 15); };
-  return {
+  const Damage table[] = {
       {"rows are missing", [=](auto& grids) { add_rows(grids, 1, 0.5, half, 2); },
        "level 1 of the field lacks grid T_row2@1"},
       {"a wrong voxel size", [=](auto& grids) { add_rows(grids, 1, 0.25, half); }, "voxels of 1/2 of their size"},
@@ -129,24 +115,20 @@ std::vector<Damage> damages() {
       {"another type",
        [=](auto& grids) {
          add_rows(grids, 1, 0.5, half, 2);
-         grids.push_back(stock_grid<openvdb::FloatGrid>("T_row2@1"));
+         grids.push_back(stock_grid_of_type("float", "T_row2@1"));
        },
        "T_row2@1 is float"},
   };
-}
-
-TEST_P(DamagedLevels, AreRefusedInOneLine) {
   const Temporary path("a.vdb");
-  openvdb::GridPtrVec grids;
-  add_rows(grids, 0, 1, [](auto& tree) { fill_from(tree, 0, 15); });
-  GetParam().change(grids);
-  write_stock(path, grids);
-  EXPECT_THAT([&] { open_tensor_vdb(path); },
-              ThrowsMessage<std::runtime_error>(
-                  AllOf(HasSubstr(path.string()), HasSubstr(GetParam().message), testing::Not(HasSubstr("\n")))));
+  for (const Damage& damage : table) {
+    openvdb::GridPtrVec grids;
+    add_rows(grids, 0, 1, [](auto& tree) { fill_from(tree, 0, 15); });
+    damage.change(grids);
+    write_stock(path, grids);
+    EXPECT_THAT(message([&] { open_tensor_vdb(path); }), AllOf(HasSubstr(path.string()), HasSubstr(damage.message)))
+        << damage.name;
+  }
 }
-
-INSTANTIATE_TEST_SUITE_P(LevelFiles, DamagedLevels, testing::ValuesIn(damages()));
 
 /// Gradients are taken at the voxels of each level: those of a quadratic velocity are exact.
 TEST(LevelFiles, GradientsAreOfEachLevel) {

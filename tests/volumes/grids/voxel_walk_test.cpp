@@ -53,20 +53,16 @@ TEST(VoxelWalk, PartsAdjoinLieInTheirVoxelsAndAreAllThatIsInTheBounds) {
   }
 }
 
-TEST(VoxelWalk, APointIsInOneVoxel) {
-  const std::vector<Part> parts = walk({0.7, 4, 3}, {0.7, 4, 3}, bounds);
-  ASSERT_EQ(parts.size(), 1u);
-  EXPECT_EQ(parts[0].voxel, Vector3i(1, 4, 3));
-  EXPECT_EQ(parts[0].from, 0);
-  EXPECT_EQ(parts[0].to, 1);
-}
-
-TEST(VoxelWalk, AnAxisOfOneVoxelIsCrossedWhole) {
-  const AlignedBox3d slab(Vector3d(0, 0, 4.5), Vector3d(8, 8, 5.5));
-  const std::vector<Part> parts = walk({2, 2, 9}, {2, 2, 1}, slab);
-  ASSERT_EQ(parts.size(), 1u);
-  EXPECT_EQ(parts[0].voxel, Vector3i(2, 2, 5));
-  EXPECT_EQ(8 * (parts[0].to - parts[0].from), 1);
+/// A point, and a line across the only voxel of an axis.
+TEST(VoxelWalk, MayBeOfOneVoxel) {
+  const std::vector<Part> point = walk({0.7, 4, 3}, {0.7, 4, 3}, bounds);
+  const std::vector<Part> across = walk({2, 2, 9}, {2, 2, 1}, {Vector3d(0, 0, 4.5), Vector3d(8, 8, 5.5)});
+  ASSERT_TRUE(point.size() == 1 && across.size() == 1);
+  EXPECT_EQ(point[0].voxel, Vector3i(1, 4, 3));
+  EXPECT_EQ(point[0].from, 0);
+  EXPECT_EQ(point[0].to, 1);
+  EXPECT_EQ(across[0].voxel, Vector3i(2, 2, 5));
+  EXPECT_EQ(8 * (across[0].to - across[0].from), 1);
 }
 
 }  // namespace

@@ -66,14 +66,6 @@ TEST(FieldMaking, GivesTheFieldOfThePreprocessedGrid) {
     for (const auto& value : {waves, symmetric, mixed, damaged}) expect_as_from_grid(value, mode);
 }
 
-TEST(FieldMaking, DoesNotDependOnThreads) {
-  const MadeField many = make_field(source_of(waves), Eigenvalues::absolute);
-  const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
-  const MadeField one = make_field(source_of(waves), Eigenvalues::absolute);
-  EXPECT_EQ(many.eigenvalues.norm_lost, one.eigenvalues.norm_lost);
-  expect_same_bricks(*many.field, *one.field);
-}
-
 TEST(FieldMaking, NothingIsLeftOfAFieldThatIsNotFinite) {
   const double infinite = std::numeric_limits<double>::infinity();
   const MadeField made =
@@ -111,15 +103,9 @@ TensorGrid grid_of(const AlignedBox3i& voxels, const std::function<Matrix3d(cons
 
 /// Holes, from single voxels to whole blocks, so that sums along one axis pass through voxels and blocks without value.
 void make_holes(TensorGrid& grid) {
-  for (TensorBlock& block : grid.blocks)
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
-      const Vector3i i = block.origin + TensorBlock::position(offset);
-      const bool is_hole = (i.x() * 7 + i.y() * 5 + i.z() * 3) % 4 == 0 || (i.x() >= 0 && i.x() < 8 && i.y() >= 0);
-      if (!is_hole) continue;
-      block.active.reset(offset);
-      block.values[offset].setZero();
-    }
-  remove_empty_blocks(grid);
+  clear_voxels(grid.blocks, [](const Vector3i& i) {
+    return (i.x() * 7 + i.y() * 5 + i.z() * 3) % 4 == 0 || (i.x() >= 0 && i.x() < 8 && i.y() >= 0);
+  });
 }
 
 /// The definition, without separating axes.
@@ -160,18 +146,16 @@ TEST(Smoothing, IsTheMeanOfActiveVoxels) {
   }
 }
 
-TEST(Smoothing, DoesNotDependOnThreads) {
-  TensorGrid many = grid_of(smoothed_box, waves), one = many;
-  smooth(many, 2);
+TEST(FieldMaking, AndSmoothingDoNotDependOnThreads) {
+  const MadeField many = make_field(source_of(waves), Eigenvalues::absolute);
+  TensorGrid smooth_by_many = grid_of(smoothed_box, waves), smooth_by_one = smooth_by_many;
+  smooth(smooth_by_many, 2);
   const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
-  smooth(one, 2);
-  expect_same_blocks(many, one);
-}
-
-TEST(Smoothing, RejectsDeviationsOutOfRange) {
-  TensorGrid grid = grid_of(smoothed_box, waves);
-  for (const double deviation : {-1.0, 20.5, std::numeric_limits<double>::quiet_NaN()})
-    EXPECT_THROW(smooth(grid, deviation), std::invalid_argument) << deviation;
+  const MadeField one = make_field(source_of(waves), Eigenvalues::absolute);
+  EXPECT_EQ(many.eigenvalues.norm_lost, one.eigenvalues.norm_lost);
+  expect_same_bricks(*many.field, *one.field);
+  smooth(smooth_by_one, 2);
+  expect_same_blocks(smooth_by_many, smooth_by_one);
 }
 
 /// A wave is lower by exp(−σ²k²/2), at the voxels of every level. Beside a level, those about it are interpolated
@@ -180,7 +164,7 @@ TEST(Smoothing, LevelsKeepTheWidthInSpace) {
   constexpr double k = 0.3, deviation = 1.5, left = 0.903707;  // exp(−σ²k²/2)
   const Formula wave = [](const Vector3d& at) { return Matrix3d(Matrix3d::Identity() * std::cos(k * at.x())); };
   TensorGrid grid = grid_of_levels(
-      {Vector3i::Zero(), Vector3i(63, 23, 23)}, 3, [](const Vector3i& brick) { return brick.x() < 4; }, wave);
+      {Vector3i::Zero(), Vector3i(63, 7, 7)}, 3, [](const Vector3i& brick) { return brick.x() < 4; }, wave);
   smooth(grid, deviation);
   for (int level = 0; level < 3; ++level)
     for (const TensorBlock& block : *levels_of(grid)[static_cast<std::size_t>(level)])
@@ -192,8 +176,10 @@ TEST(Smoothing, LevelsKeepTheWidthInSpace) {
       }
 }
 
-TEST(Smoothing, NoiseOfLevelsIsRefused) {
+TEST(Smoothing, RefusesDeviationsOutOfRangeAndNoiseOfLevels) {
   TensorGrid grid = grid_of(smoothed_box, waves);
+  for (const double deviation : {-1.0, 20.5, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THROW(smooth(grid, deviation), std::invalid_argument) << deviation;
   grid.finer.push_back(grid.blocks);
   EXPECT_THROW(keep_noise(grid), std::invalid_argument);
 }

@@ -17,10 +17,7 @@ namespace fs = std::filesystem;
 using Arrays = std::map<std::string, DataArray>;
 
 openvdb::points::PointDataGrid::Ptr read_points(const fs::path& path) {
-  openvdb::initialize();
-  openvdb::io::File file(path.string());
-  file.open(/*delayLoad=*/false);
-  return openvdb::gridPtrCast<openvdb::points::PointDataGrid>(file.readGrid("points"));
+  return stock_grid_of<openvdb::points::PointDataGrid>(path, "points");
 }
 
 std::vector<Record> records_of(const openvdb::points::PointDataGrid& grid) {

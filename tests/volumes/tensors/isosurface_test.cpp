@@ -1,10 +1,8 @@
 #include "volumes/tensors/isosurface.h"
 
 #include <limits>
-#include <map>
 #include <random>
 #include <stdexcept>
-#include <utility>
 
 #include <tbb/global_control.h>
 
@@ -53,19 +51,6 @@ double max_radius_error(const Isosurface& surface, double radius) {
   return error;
 }
 
-/// Edges that belong to one triangle only, in the direction of the triangle.
-int open_edges(const Isosurface& surface) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
-  for (const Triangle& t : surface.mesh.triangles)
-    for (int i = 0; i < 3; ++i) {
-      ++uses[{t[i], t[(i + 1) % 3]}];
-      --uses[{t[(i + 1) % 3], t[i]}];
-    }
-  int open = 0;
-  for (const auto& [edge, balance] : uses) open += balance > 0;
-  return open;
-}
-
 /// Smaller values are inside: triangles and normals face the middle.
 void expect_inwards(const Isosurface& surface, double tolerance) {
   ASSERT_EQ(surface.normals.size(), surface.mesh.vertices.size());
@@ -82,7 +67,7 @@ TEST(IsosurfaceTest, SphereOfSecondOrder) {
     const int n = 8 << i;
     const double h = 1.0 / n;
     const Isosurface surface = isosurface(cube(n), Invariant::largest_eigenvalue, radius);
-    EXPECT_EQ(open_edges(surface), 0);
+    EXPECT_EQ(open_edges(surface.mesh), 0u);
     expect_inwards(surface, 2 * h * h / (radius * radius));
     radius_error[i] = max_radius_error(surface, radius);
     area_error[i] = std::abs(area(surface) - exact);
@@ -105,7 +90,7 @@ TEST(IsosurfaceTest, AnyAffineTransform) {
   for (const Eigen::Affine3d& transform : {to_world, mirrored}) {
     const TensorField field = distance_field({Vector3i::Constant(-30), Vector3i::Constant(30)}, transform);
     const Isosurface surface = isosurface(field, Invariant::largest_eigenvalue, 0.7);
-    EXPECT_EQ(open_edges(surface), 0);
+    EXPECT_EQ(open_edges(surface.mesh), 0u);
     EXPECT_LT(max_radius_error(surface, 0.7), 0.08 * 0.08 / 0.7);
     EXPECT_NEAR(area(surface), 4 * pi * 0.49, 4 * pi * 0.49 * 2 * 0.0064 / 0.49);
     expect_inwards(surface, 0.05);
@@ -121,7 +106,7 @@ TEST(IsosurfaceTest, IsOpenAtTheFacesOfTheExtentAndEndsOnThem) {
   double furthest = -1;
   for (const Vector3d& vertex : surface.mesh.vertices) furthest = std::max(furthest, vertex.x());
   EXPECT_EQ(furthest, 0.25);
-  EXPECT_GT(open_edges(surface), 40);
+  EXPECT_GT(open_edges(surface.mesh), 40u);
   const double exact = 2 * pi * 0.6 * (0.25 - center.x() + 0.6);
   EXPECT_NEAR(area(surface), exact, exact * 0.02);
   EXPECT_LT(max_radius_error(surface, 0.6), 0.5 / n);
@@ -138,7 +123,7 @@ TEST(IsosurfaceTest, InactiveVoxelsCountAsZero) {
     grid.blocks.insert(at < 0 ? grid.blocks.begin() : grid.blocks.end(), far.blocks.begin(), far.blocks.end());
   }
   const Isosurface surface = isosurface(TensorField(grid), Invariant::trace, 3);
-  EXPECT_EQ(open_edges(surface), 0);
+  EXPECT_EQ(open_edges(surface.mesh), 0u);
   const Eigen::AlignedBox3d box = surface.mesh.bounds();
   EXPECT_LT((box.min() - Vector3d(-4.5, 11.5, -4.5)).norm(), 1e-5);
   EXPECT_LT((box.max() - Vector3d(4.5, 20.5, 4.5)).norm(), 1e-5);
@@ -219,23 +204,20 @@ TEST(FieldStatistics, EigenvaluesAndFractions) {
 }
 
 TEST(FieldStatistics, LeavesNonFiniteVoxelsOut) {
-  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
-    return (i.x() > 4 ? std::numeric_limits<double>::quiet_NaN() : 2.0) * Matrix3d::Identity();
-  });
-  const FieldStatistics s = field_statistics(grid);
-  EXPECT_EQ(s.active_voxels, 1000u);
-  EXPECT_EQ(s.non_finite, 300u);
-  EXPECT_EQ(s.index_box.max(), Vector3i(4, 9, 9));
-  EXPECT_NEAR(s.norm[6], 2 * std::sqrt(3.0), 1e-6);
-  EXPECT_EQ(s.real_max, 2);
-}
-
-TEST(FieldStatistics, OfNothingFinite) {
-  const TensorGrid grid = stretched_grid([](const Vector3i&) -> Matrix3d { return Matrix3d::Constant(INFINITY); });
-  const FieldStatistics s = field_statistics(grid);
-  EXPECT_EQ(s.non_finite, 1000u);
-  EXPECT_TRUE(s.index_box.isEmpty());
-  EXPECT_EQ(s.memory_bytes, 0u);
+  const auto statistics = [](int first) {  // Of a field that is not finite from x = first on.
+    return field_statistics(stretched_grid([=](const Vector3i& i) -> Matrix3d {
+      return (i.x() >= first ? std::numeric_limits<double>::quiet_NaN() : 2.0) * Matrix3d::Identity();
+    }));
+  };
+  const FieldStatistics some = statistics(5), none = statistics(-2);
+  EXPECT_EQ(some.active_voxels, 1000u);
+  EXPECT_EQ(some.non_finite, 300u);
+  EXPECT_EQ(some.index_box.max(), Vector3i(4, 9, 9));
+  EXPECT_NEAR(some.norm[6], 2 * std::sqrt(3.0), 1e-6);
+  EXPECT_EQ(some.real_max, 2);
+  EXPECT_EQ(none.non_finite, 1000u);
+  EXPECT_TRUE(none.index_box.isEmpty());
+  EXPECT_EQ(none.memory_bytes, 0u);
 }
 
 TEST(FieldStatistics, DoesNotDependOnThreads) {

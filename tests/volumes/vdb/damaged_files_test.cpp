@@ -24,7 +24,7 @@ void expect_all_truncations_fail(const std::string& bytes, const std::string& la
   for (const std::size_t length : lengths) {
     write_bytes(path, bytes.substr(0, length));
     EXPECT_THAT([&] { read_tensor_vdb(path); },
-                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), testing::Not(HasSubstr("\n")))))
+                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), Not(HasSubstr("\n")))))
         << label << " " << length;
     EXPECT_THROW(list_vdb(path), std::runtime_error) << label << " " << length;
   }
@@ -35,13 +35,11 @@ TEST(DamagedFiles, TruncationIsNoticed) {
   const Temporary path("a.vdb"), recompressed("b.vdb");
   for (const bool half : {false, true}) {
     write_tensor_vdb(path, sparse_grid(), half);
-    openvdb::io::File file(path.string());
-    file.open(/*delayLoad=*/false);
-    const auto grids = file.getGrids();
+    const openvdb::GridPtrVec grids = stock_grids(path);
     for (const std::uint32_t compression :
          std::initializer_list<std::uint32_t>{COMPRESS_NONE, COMPRESS_ACTIVE_MASK, COMPRESS_ZIP | COMPRESS_ACTIVE_MASK,
                                               COMPRESS_BLOSC | COMPRESS_ACTIVE_MASK}) {
-      write_stock(recompressed, *grids, compression);
+      write_stock(recompressed, grids, compression);
       expect_same_blocks(read_tensor_vdb(recompressed), read_tensor_vdb(path));
       expect_all_truncations_fail(bytes_of(recompressed), compressionToString(compression));
     }
@@ -52,10 +50,8 @@ TEST(DamagedFiles, LengthsOfZipThatAreTooLarge) {
   using namespace openvdb::io;
   const Temporary path("a.vdb"), stock("b.vdb"), damaged("c.vdb");
   write_tensor_vdb(path, sparse_grid());
-  openvdb::io::File file(path.string());
-  file.open(/*delayLoad=*/false);
   for (const std::uint32_t mask : {0u, std::uint32_t{COMPRESS_ACTIVE_MASK}}) {
-    write_stock(stock, *file.getGrids(), COMPRESS_ZIP | mask);
+    write_stock(stock, stock_grids(path), COMPRESS_ZIP | mask);
     const std::string bytes = bytes_of(stock);
     // A chunk of a leaf begins with its length, which is below that of the leaf's values; its stream of zlib follows.
     std::size_t chunk = bytes.rfind("\x78\x9c");
@@ -80,8 +76,10 @@ void expect_sound(const TensorGrid& grid) {
     const auto key = [](const Eigen::Vector3i& at) { return std::make_tuple(at.x(), at.y(), at.z()); };
     EXPECT_TRUE(!before || key(*before) < key(block.origin));
     before = &block.origin;
+    bool is_zero_elsewhere = true;
     for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-      EXPECT_TRUE(block.active[offset] || block.values[offset].isZero(0)) << offset;
+      is_zero_elsewhere = is_zero_elsewhere && (block.active[offset] || block.values[offset].isZero(0));
+    EXPECT_TRUE(is_zero_elsewhere) << block.origin.transpose();
   }
 }
 
@@ -103,9 +101,7 @@ TEST_P(FlippedBytes, NeverCrash) {
   const auto [half, compression] = GetParam();
   const Temporary path("a.vdb"), stock("b.vdb"), damaged("c.vdb");
   write_tensor_vdb(path, sparse_grid(), half);
-  openvdb::io::File file(path.string());
-  file.open(/*delayLoad=*/false);
-  write_stock(stock, *file.getGrids(), compression);
+  write_stock(stock, stock_grids(path), compression);
   const std::string bytes = bytes_of(stock);
   int refused = 0;
   constexpr std::size_t flips = 150;
@@ -117,7 +113,7 @@ TEST_P(FlippedBytes, NeverCrash) {
     try {
       const TensorGrid grid = read_tensor_vdb(damaged);
       expect_sound(grid);
-      expect_same_bits(grid, read_tensor_vdb(damaged));
+      if (grid.blocks.size() < 1000) expect_same_bits(grid, read_tensor_vdb(damaged));  // Others have large tiles.
     } catch (const std::runtime_error& error) {
       ++refused;
       EXPECT_THAT(error.what(), AllOf(HasSubstr(damaged.string()), testing::Not(HasSubstr("\n"))));
@@ -195,7 +191,7 @@ TEST(DamagedFiles, ReadsFormatsThatHoldUnknownGrids) {
   // An unknown type in the table of grids does not hide other grids: rename the type of an unrelated grid.
   const Temporary path("a.vdb");
   openvdb::GridPtrVec grids = voxel_rows("T");
-  grids.insert(grids.begin(), stock_grid<openvdb::Int32Grid>("other"));
+  grids.insert(grids.begin(), stock_grid_of_type("int32", "other"));
   write_stock(path, grids);
   std::string bytes = bytes_of(path);
   const std::size_t at = bytes.find("Tree_int32_5_4_3");

@@ -1,0 +1,57 @@
+#pragma once
+/// What is imported of a file.
+
+#include "base/process/progress.h"
+#include "tests/import/mesh_fixtures.h"
+#include "tools/import/import_file.h"
+
+namespace tensorray {
+
+struct Imported {
+  TensorGrid grid;
+  ImportReport report;
+
+  std::size_t voxels() const { return grid.active_voxels(); }
+
+  /// The tensor of all voxels, which must be the same but for `tolerance`.
+  Eigen::Matrix3d tensor(double tolerance = 1e-5) const {
+    Eigen::Matrix3d first = Eigen::Matrix3d::Constant(NAN);
+    mesh_fixtures::for_each_voxel(grid, [&](const auto&, const Eigen::Matrix3d& value) {
+      if (first.hasNaN()) first = value;
+      EXPECT_LT((value - first).norm(), tolerance);
+    });
+    return first;
+  }
+
+  std::string notes() const { return joined(report.notes); }
+  std::string warnings() const { return joined(report.warnings); }
+
+ private:
+  static std::string joined(const std::vector<std::string>& lines) {
+    std::string text;
+    for (const std::string& line : lines) text += line + "\n";
+    return text;
+  }
+};
+
+inline Imported imported(const ImportSettings& settings) {
+  Imported result;
+  result.grid = import_tensors(settings, Progress(), result.report);
+  return result;
+}
+
+inline Imported imported(const std::filesystem::path& file, ImportSettings settings = {}) {
+  settings.files = {file};
+  return imported(settings);
+}
+
+/// The settings of an array, and of voxels of a size if one is given.
+inline ImportSettings array_settings(const std::string& array, Take take = Take::tensor, double voxel = 0) {
+  ImportSettings settings;
+  settings.array = array;
+  settings.take = take;
+  if (voxel > 0) settings.sampling.resolution = voxel;
+  return settings;
+}
+
+}  // namespace tensorray
