@@ -125,6 +125,13 @@ inline Caustic caustic_of(const LightBench& bench, const FlowMap& map,
 
 inline double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
+/// The L2 distance from `exact`, as a part of its norm.
+inline double relative_distance(const std::vector<double>& values, const std::vector<double>& exact) {
+  const auto count = static_cast<Eigen::Index>(exact.size());
+  const Eigen::Map<const Eigen::VectorXd> a(values.data(), count), b(exact.data(), count);
+  return (a - b).norm() / b.norm();
+}
+
 inline double power_of(const Caustic& caustic, RayEnd end) { return caustic.power[0][static_cast<int>(end)]; }
 
 inline double all_power(const Caustic& caustic) {

@@ -289,6 +289,10 @@ class LiveSceneTest : public test::ViewTest {
     live.load(scene, outputs_, progress_);
     return display_image(live.scene(), *live.render(progress_), false);
   }
+  Image shown_anew(const Json& scene) {
+    LiveScene anew(scene_file());
+    return shown(anew, scene);
+  }
 };
 
 TEST_F(LiveSceneTest, PicturesAfterChangesAreThoseOfANewScene) {
@@ -374,13 +378,11 @@ TEST_F(LiveSceneTest, ThePolariscopeTracesOnceForAllArrangements) {
   const auto kept = live.scene().kept;
   for (const double angle : {10.0, 40.0}) {
     scene["integrator"]["analyzer"] = angle;
-    LiveScene anew(scene_file());
-    EXPECT_EQ(shown(live, scene).pixels, shown(anew, scene).pixels) << angle;
+    EXPECT_EQ(shown(live, scene).pixels, shown_anew(scene).pixels) << angle;
     EXPECT_EQ(live.scene().kept, kept);
   }
   scene["field"]["generate"]["resolution"] = 9;
-  LiveScene anew(scene_file());
-  EXPECT_EQ(shown(live, scene).pixels, shown(anew, scene).pixels);
+  EXPECT_EQ(shown(live, scene).pixels, shown_anew(scene).pixels);
   EXPECT_NE(live.scene().kept, kept);
 }
 

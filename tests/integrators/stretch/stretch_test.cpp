@@ -139,9 +139,8 @@ TEST(Stretch, RefusesSettingsOutOfRangeAndStopsWhenCancelled) {
   const TensorField field = constant_field(Matrix3d::Zero());
   const Geometry geometry(surfaces_of(field));
   Progress progress;
-  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(0), 9, progress), std::invalid_argument);
-  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(-1), 9, progress), std::invalid_argument);
-  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(INFINITY), 9, progress), std::invalid_argument);
+  for (const double length : {0.0, -1.0, double{INFINITY}})
+    EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(length), 9, progress), std::invalid_argument);
   EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(1), 1, progress), std::invalid_argument);
   progress.cancelled = true;
   EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(1), 9, progress), Cancelled);
