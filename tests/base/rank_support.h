@@ -21,7 +21,7 @@ struct Table {
   std::mutex mutex;
   std::condition_variable changed;
   std::vector<std::string> parts, given;
-  std::size_t waiting = 0, rounds = 0, bytes = 0;
+  std::size_t waiting = 0, rounds = 0;
 };
 
 class ThreadRanks : public Ranks {
@@ -33,7 +33,6 @@ class ThreadRanks : public Ranks {
 
   std::vector<std::string> all_gather(const std::string& mine) override {
     std::unique_lock lock(table_.mutex);
-    table_.bytes += mine.size();
     table_.parts[rank_] = mine;
     const std::size_t round = table_.rounds;
     if (++table_.waiting == count()) {
@@ -73,8 +72,8 @@ class ThreadRanks : public Ranks {
   const std::size_t rank_;
 };
 
-/// Calls `work` for each rank, in threads. @return the bytes that they have given each other.
-inline std::size_t run_ranks(std::size_t count, const std::function<void(Ranks& ranks)>& work) {
+/// Calls `work` for each rank, in threads.
+inline void run_ranks(std::size_t count, const std::function<void(Ranks& ranks)>& work) {
   Table table;
   table.parts.resize(count);
   std::vector<std::thread> threads;
@@ -84,7 +83,6 @@ inline std::size_t run_ranks(std::size_t count, const std::function<void(Ranks& 
       work(ranks);
     });
   for (std::thread& each : threads) each.join();
-  return table.bytes;
 }
 
 /// One of two ranks, of which the other one is another program, say.

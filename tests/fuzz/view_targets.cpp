@@ -1,19 +1,15 @@
 #include "tests/fuzz/view_targets.h"
 
 #include <condition_variable>
-#include <fstream>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <stdexcept>
-#include <thread>
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
 
 #include "tests/viewer/view_support.h"
-#include "tools/viewer/server/server.h"
 
 namespace tensorray::test {
 namespace {
@@ -22,40 +18,12 @@ namespace asio = boost::asio;
 using tcp = asio::ip::tcp;
 
 /// A server of a small scene, until the program ends.
-class View {
- public:
-  View() {
-    std::ofstream(folder_ / "scene.json") << small_scene();
-    for (const char* file : {"index.html", "view.js", "view.css"}) std::ofstream(folder_ / file) << file;
-    pages_.emplace(ViewedScene{folder_ / "scene.json", {}, folder_ / "saved.json"}, progress_);
+RunningView& view() {
+  static RunningView only([] {
     ServerSettings settings;
     settings.token = "secret";
-    settings.page = folder_ / "";
-    server_.emplace(settings, *pages_);
-    thread_ = std::thread([this] { server_->run(progress_); });
-  }
-  ~View() {
-    progress_.cancelled = true;
-    thread_.join();
-  }
-
-  Pages& pages() { return *pages_; }
-
-  std::string port() const {
-    const std::string url = server_->url(), before = "http://127.0.0.1:";
-    return url.substr(before.size(), url.find('/', before.size()) - before.size());
-  }
-
- private:
-  TemporaryFolder folder_;
-  Progress progress_;
-  std::optional<Pages> pages_;
-  std::optional<Server> server_;
-  std::thread thread_;
-};
-
-View& view() {
-  static View only;
+    return settings;
+  }());
   return only;
 }
 

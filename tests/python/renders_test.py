@@ -22,7 +22,7 @@ OTHERS = {
     "lens": {"field": FIELD, "receiver": {"resolution": [24, 24]}, "integrator": {"type": "lens"}},
     "path_tracing": {"field": FIELD, "camera": {"resolution": [24, 24]},
                      "integrator": {"type": "path_tracing", "max_samples": 4}},
-    "stretch": {"field": FIELD, "integrator": {"type": "stretch", "stretch": {"resolution": 16}}},
+    "stretch": {"field": FIELD, "integrator": {"type": "stretch", "stretch": {"pixels": 48}}},
     "polariscope": {"field": FIELD, "receiver": {"resolution": [24, 24]}, "integrator": {"type": "polariscope"}},
 }
 

@@ -17,18 +17,14 @@ import numpy as np
 import tensorray as tr
 
 FIELD = {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "absolute", "scale": 4}
-PATHS = {"field": FIELD, "camera": {"resolution": [60, 50]},
+PATHS = {"field": FIELD, "camera": {"resolution": [30, 25]},
          "integrator": {"type": "path_tracing", "max_samples": 16, "min_samples": 8}}
-WHOLE = {"field": FIELD, "camera": {"resolution": [50, 40]},
+WHOLE = {"field": FIELD, "camera": {"resolution": [25, 20]},
          "integrator": {"type": "scene", "max_samples": 8, "min_samples": 4, "bands": 4, "bands_per_sample": 4,
                         "caustic": {"resolution": 32, "rays": 1000, "passes": 1}}}
 PLATE = {"field": FIELD, "light": {"photons": 2000, "wavelengths": {"count": 4}}, "receiver": {"resolution": [40, 30]},
          "integrator": {"type": "photon_distribution"}}
 LONG = {**PATHS, "integrator": {"type": "path_tracing", "max_samples": 10**6, "noise": 0}}  # Hours.
-
-
-def processes():
-    return concurrent.futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))
 
 
 class Dask:
@@ -60,6 +56,11 @@ class Failing:
 
 
 class ShardsTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.pool = concurrent.futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))
+        cls.addClassCleanup(cls.pool.shutdown)
+
     def setUp(self):
         temporary = tempfile.TemporaryDirectory()
         self.addCleanup(temporary.cleanup)
@@ -71,11 +72,11 @@ class ShardsTest(unittest.TestCase):
             self.assertEqual(getattr(a, name).tobytes(), getattr(b, name).tobytes(), name)
 
     def test_the_bits_are_those_of_one_render(self):
-        with processes() as pool:
-            for scene, shards, executor in ((PATHS, 40, None), (WHOLE, 3, pool), (PLATE, 3, None)):
-                whole, parts = (tr.render(scene, keep=["spectral", "photons"] if scene is PLATE else [], **more)
-                                for more in ({}, dict(shards=shards, executor=executor, shard_folder=self.folder)))
-                self.expect_same(parts, whole)
+        # More shards than the picture has tiles; by processes; with all that a picture keeps.
+        for scene, shards, executor in ((PATHS, 12, None), (WHOLE, 3, self.pool), (PLATE, 3, None)):
+            whole, parts = (tr.render(scene, keep=["spectral", "photons"] if scene is PLATE else [], **more)
+                            for more in ({}, dict(shards=shards, executor=executor, shard_folder=self.folder)))
+            self.expect_same(parts, whole)
         self.assertEqual(parts.spectral.tobytes(), whole.spectral.tobytes())
         self.assertEqual(parts.photons.tobytes(), whole.photons.tobytes())
         self.assertEqual(os.listdir(self.folder), [])
@@ -84,14 +85,13 @@ class ShardsTest(unittest.TestCase):
         made = tr.make("vortex", resolution=[9, 10, 11])
         made.write(os.path.join(self.folder, "field.vdb"))
         scene = {key: value for key, value in PATHS.items() if key != "field"}
-        with processes() as pool:
-            for field in (made, tr.read_vdb(os.path.join(self.folder, "field.vdb")),
-                          tr.Field(np.random.default_rng(1).normal(size=(9, 8, 7, 3, 3))[::2], voxel_size=0.3)):
-                copy = pickle.loads(pickle.dumps(field))
-                np.testing.assert_array_equal(copy.tensors, field.tensors)
-                np.testing.assert_array_equal(copy.to_world, field.to_world)
-                self.assertEqual((copy.name, copy.metadata), (field.name, field.metadata))
-                self.expect_same(tr.render(scene, field, shards=2, executor=pool), tr.render(scene, copy))
+        for field in (made, tr.read_vdb(os.path.join(self.folder, "field.vdb")),
+                      tr.Field(np.random.default_rng(1).normal(size=(9, 8, 7, 3, 3))[::2], voxel_size=0.3)):
+            copy = pickle.loads(pickle.dumps(field))
+            np.testing.assert_array_equal(copy.tensors, field.tensors)
+            np.testing.assert_array_equal(copy.to_world, field.to_world)
+            self.assertEqual((copy.name, copy.metadata), (field.name, field.metadata))
+            self.expect_same(tr.render(scene, field, shards=2, executor=self.pool), tr.render(scene, copy))
 
     def test_scenes_and_fields_in_files(self):
         tr.make("vortex", resolution=9).write(os.path.join(self.folder, "field.vdb"))
@@ -100,14 +100,13 @@ class ShardsTest(unittest.TestCase):
             json.dump(scene, file)
         whole = tr.render(scene, folder=self.folder)
         here = os.getcwd()
-        with processes() as pool:
-            pool.submit(os.getcwd).result()  # Its processes keep this working folder.
-            try:
-                os.chdir(self.folder)
-                for source in (scene, "scene.json"):
-                    self.expect_same(tr.render(source, shards=2, executor=pool), whole)
-            finally:
-                os.chdir(here)
+        self.pool.submit(os.getcwd).result()  # Its processes keep this working folder.
+        try:
+            os.chdir(self.folder)
+            for source in (scene, "scene.json"):
+                self.expect_same(tr.render(source, shards=2, executor=self.pool), whole)
+        finally:
+            os.chdir(here)
 
     def test_other_executors(self):
         whole = tr.render(PATHS)
@@ -153,10 +152,9 @@ class ShardsTest(unittest.TestCase):
 
     def test_errors_of_processes_name_the_shard(self):
         scene = {**PATHS, "field": {"file": os.path.join(self.folder, "nowhere.vdb")}}
-        with processes() as pool:
-            for executor in (None, pool):
-                with self.assertRaisesRegex(RuntimeError, r"^shard [12]/2: .*nowhere\.vdb"):
-                    tr.render(scene, shards=2, executor=executor)
+        for executor in (None, self.pool):
+            with self.assertRaisesRegex(RuntimeError, r"^shard [12]/2: .*nowhere\.vdb"):
+                tr.render(scene, shards=2, executor=executor)
 
     def test_a_folder_that_is_not_shared_is_named(self):
         from tensorray import _shards
@@ -165,23 +163,24 @@ class ShardsTest(unittest.TestCase):
 
     def test_a_shard_ends_with_its_render(self):
         """Another shard fails: the process of this one becomes free."""
-        with processes() as pool:
-            class Executor:
-                def __init__(self):
-                    self.running, self.broken = None, concurrent.futures.Future()
+        pool = self.pool
 
-                def submit(self, function, *arguments):
-                    if self.running is None:
-                        self.running = pool.submit(function, *arguments)
-                        return self.running
-                    threading.Timer(1, self.broken.set_exception, [RuntimeError("lost")]).start()
-                    return self.broken
+        class Executor:
+            def __init__(self):
+                self.running, self.broken = None, concurrent.futures.Future()
 
-            executor = Executor()
-            with self.assertRaisesRegex(RuntimeError, "shard 2/2: lost"):
-                tr.render(LONG, shards=2, executor=executor)
-            with self.assertRaisesRegex(RuntimeError, "the render has ended|is not there"):
-                executor.running.result()
+            def submit(self, function, *arguments):
+                if self.running is None:
+                    self.running = pool.submit(function, *arguments)
+                    return self.running
+                threading.Timer(1, self.broken.set_exception, [RuntimeError("lost")]).start()
+                return self.broken
+
+        executor = Executor()
+        with self.assertRaisesRegex(RuntimeError, "shard 2/2: lost"):
+            tr.render(LONG, shards=2, executor=executor)
+        with self.assertRaisesRegex(RuntimeError, "the render has ended|is not there"):
+            executor.running.result()
 
     def test_interrupts(self):
         """Ctrl-C of the calling process alone."""

@@ -10,8 +10,8 @@
 
 namespace tensorray::test {
 
-/// A cube in parallel light along −z, and a plate.
-struct FlowBench {
+/// A volume in parallel light, and a plate.
+struct LightBench {
   TensorField field;
   Geometry geometry;
   Beam beam;
@@ -19,14 +19,16 @@ struct FlowBench {
   const Plate& plate() const { return *geometry.surfaces().plate; }
 };
 
-inline FlowBench make_bench(const TensorFunction& tensor, const Plate& plate, Surfaces extra = {}, int voxels = 17,
-                            const Eigen::Vector3d& direction = {0, 0, -1}) {
-  TensorField field = cube_field(voxels, tensor);
-  Surfaces surfaces = std::move(extra);
-  surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
-  surfaces.plate = plate;
-  Beam beam = silhouette_beam(field.corners(), direction, Eigen::Vector3d::UnitY());
-  return {std::move(field), Geometry(std::move(surfaces)), std::move(beam)};
+inline LightBench make_bench(TensorField field, const Plate& plate, Surfaces extra = {},
+                             const Eigen::Vector3d& direction = {0, 0, -1}) {
+  extra.bounds = surfaces_of(field).bounds;
+  extra.plate = plate;
+  Beam beam = silhouette_beam(field.corners(), direction.normalized(), Eigen::Vector3d::UnitY());
+  return {std::move(field), Geometry(std::move(extra)), std::move(beam)};
+}
+
+inline LightBench make_bench(const TensorFunction& tensor, const Plate& plate, Surfaces extra = {}, int voxels = 17) {
+  return make_bench(cube_field(voxels, tensor), plate, std::move(extra));
 }
 
 inline Plate plate_at(double distance, double size, int resolution) {
@@ -34,6 +36,17 @@ inline Plate plate_at(double distance, double size, int resolution) {
   plate.size = {size, size};
   plate.resolution = {resolution, resolution};
   return plate;
+}
+
+/// `count` bands of equal widths and weights between two samples.
+inline std::vector<CausticBand> equal_bands(std::size_t count, double first, double last) {
+  std::vector<CausticBand> bands(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    bands[i].width = (last - first) / static_cast<double>(count);
+    bands[i].sample = first + (static_cast<double>(i) + 0.5) * bands[i].width;
+    bands[i].weight = 1.0 / static_cast<double>(count);
+  }
+  return bands;
 }
 
 inline Eigen::Matrix3d zero(const Eigen::Vector3d&) { return Eigen::Matrix3d::Zero(); }
@@ -75,6 +88,19 @@ FlowMap lattice_map(int count, double low, double high, const Map& landing) {
   return map;
 }
 
+/// Gives a map of one wavelength `samples` of them, which all land. @param moves  By how much, from a start and a
+/// sample.
+template <class Moves>
+void spread(FlowMap& map, std::size_t samples, const Moves& moves) {
+  std::vector<Eigen::Vector2f> landings;
+  for (std::size_t i = 0; i < map.starts.size(); ++i)
+    for (std::size_t sample = 0; sample < samples; ++sample)
+      landings.push_back(map.landings[i] + Eigen::Vector2d(moves(map.starts[i], sample)).cast<float>());
+  map.landings = std::move(landings);
+  map.wavelengths = samples;
+  map.ends.assign(map.landings.size(), RayEnd::plate);
+}
+
 inline FlowSettings range(double first, double last) {
   FlowSettings settings;
   settings.flexibilities = {first, last};
@@ -88,16 +114,23 @@ inline FlowSettings single(double flexibility) {
   return settings;
 }
 
-inline FlowMap map_of(const FlowBench& bench, const FlowSettings& settings) {
+inline FlowMap map_of(const LightBench& bench, const FlowSettings& settings) {
   return trace_flow_map(bench.field, bench.geometry, bench.beam, {}, settings, Progress());
 }
 
-inline Caustic caustic_of(const FlowBench& bench, const FlowMap& map,
+inline Caustic caustic_of(const LightBench& bench, const FlowMap& map,
                           const std::vector<CausticBand>& bands = {CausticBand{}}) {
   return draw_caustic(map, bench.plate(), bands, {}, Progress());
 }
 
 inline double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+
+/// The L2 distance from `exact`, as a part of its norm.
+inline double relative_distance(const std::vector<double>& values, const std::vector<double>& exact) {
+  const auto count = static_cast<Eigen::Index>(exact.size());
+  const Eigen::Map<const Eigen::VectorXd> a(values.data(), count), b(exact.data(), count);
+  return (a - b).norm() / b.norm();
+}
 
 inline double power_of(const Caustic& caustic, RayEnd end) { return caustic.power[0][static_cast<int>(end)]; }
 

@@ -115,6 +115,12 @@ inline TensorField lattice_field(const Eigen::AlignedBox3i& box, const Lattice& 
   return cubic_field(lattice_grid(box, lattice, tensor));
 }
 
+/// The field of a grid that was made for another lattice.
+inline TensorField placed(TensorGrid grid, const Lattice& lattice) {
+  grid.to_world = lattice.to_world;
+  return cubic_field(grid);
+}
+
 inline TensorGrid without_blocks(TensorGrid grid, double fraction, unsigned seed) {
   Numbers numbers(seed);
   const auto taken = [&](const TensorBlock&) { return numbers.next() < fraction; };

@@ -52,6 +52,39 @@ inline Surfaces surfaces_of(const TensorField& field) {
   return surfaces;
 }
 
+inline Geometry geometry_with(const TensorField& field, const Plate& plate) {
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate;
+  return Geometry(std::move(surfaces));
+}
+
+inline TriangleMesh box_between(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
+                                const Eigen::Affine3d& placement = Eigen::Affine3d::Identity()) {
+  return box_mesh(Eigen::AlignedBox3d(low, high), placement);
+}
+
+/// Surfaces that are a box: an obstacle, or the cut.
+inline Surfaces obstacle_between(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  Surfaces surfaces;
+  surfaces.obstacles = {box_between(low, high)};
+  return surfaces;
+}
+inline Surfaces cut_between(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  Surfaces surfaces;
+  surfaces.cut = box_between(low, high);
+  return surfaces;
+}
+
+inline TriangleMesh joined(const std::vector<TriangleMesh>& parts) {
+  TriangleMesh all;
+  for (const TriangleMesh& part : parts) {
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
+    for (const auto& t : part.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  return all;
+}
+
 /// A large plate at `distance` from the origin along `direction`, across it.
 inline Plate plate_across(const Eigen::Vector3d& direction, double distance) {
   Plate plate;
@@ -79,21 +112,25 @@ inline Ray trace_one(const TensorField& field, const Geometry& geometry, const B
   return {batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]};
 }
 
-/// A ray through a formula, by the classical Runge–Kutta method with steps far below what tests measure.
-inline Ray through_formula(const TensorFunction& T, double s, Eigen::Vector3d P, Eigen::Vector3d V, double length) {
-  constexpr int steps = 4000;
-  const double h = length / steps;
+/// One step of the classical Runge–Kutta method for P' = V, V' = s (T V − (VᵀTV) V).
+inline Ray stepped(const TensorFunction& T, double s, const Ray& ray, double h) {
   const auto bend = [&](const Eigen::Vector3d& at, const Eigen::Vector3d& v) {
     const Eigen::Vector3d Tv = T(at) * v;
     return Eigen::Vector3d(s * (Tv - v.dot(Tv) / v.squaredNorm() * v));
   };
-  for (int i = 0; i < steps; ++i) {
-    const Eigen::Vector3d k1 = bend(P, V), v2 = V + h / 2 * k1, k2 = bend(P + h / 2 * V, v2), v3 = V + h / 2 * k2,
-                          k3 = bend(P + h / 2 * v2, v3), v4 = V + h * k3, k4 = bend(P + h * v3, v4);
-    P += h / 6 * (V + 2 * v2 + 2 * v3 + v4);
-    V = (V + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)).normalized();
-  }
-  return {P, V};
+  const Eigen::Vector3d &P = ray.position, &V = ray.direction;
+  const Eigen::Vector3d k1 = bend(P, V), v2 = V + h / 2 * k1, k2 = bend(P + h / 2 * V, v2), v3 = V + h / 2 * k2,
+                        k3 = bend(P + h / 2 * v2, v3), v4 = V + h * k3, k4 = bend(P + h * v3, v4);
+  return {P + h / 6 * (V + 2 * v2 + 2 * v3 + v4), (V + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)).normalized()};
+}
+
+/// A ray through a formula, in steps far below what tests measure.
+inline Ray through_formula(const TensorFunction& T, double s, const Eigen::Vector3d& P, const Eigen::Vector3d& V,
+                           double length) {
+  constexpr int steps = 4000;
+  Ray ray{P, V};
+  for (int i = 0; i < steps; ++i) ray = stepped(T, s, ray, length / steps);
+  return ray;
 }
 
 /// All points of a ray.
@@ -133,6 +170,13 @@ inline Eigen::Matrix3d linear_tensor(const Eigen::Vector3d& p) {
   y << -0.25, 0.5, 0.5, -0.75, 1.0, 0.25, 0.25, -0.5, 0.5;
   z << 0.75, -0.5, 0.25, 0.5, -0.25, 1.0, 1.25, 0.25, -0.5;
   return general_tensor() + p.x() * x + p.y() * y + p.z() * z;
+}
+
+/// Smooth; it focuses and turns light.
+inline Eigen::Matrix3d focusing_tensor(const Eigen::Vector3d& p) {
+  Eigen::Matrix3d T;
+  T << 0.4 * p.x(), 0.1, -p.x(), 0, 0.5, -0.8 * p.y(), 0.5 - p.x(), -p.y(), -0.3;
+  return T;
 }
 
 }  // namespace tensorray::test

@@ -3,7 +3,6 @@
 #include "tools/viewer/server/server.h"
 
 #include <map>
-#include <thread>
 
 #include <boost/asio/connect.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -24,31 +23,16 @@ namespace http = beast::http;
 using tcp = asio::ip::tcp;
 using Socket = beast::websocket::stream<tcp::socket>;
 
-class ServerTest : public test::ViewTest {
+ServerSettings settings_of(const std::string& token) {
+  ServerSettings settings;
+  settings.token = token;
+  settings.hosts = {"workstation"};
+  settings.max_waiting_bytes = 1 << 20;
+  return settings;
+}
+
+class ServerTest : public ::testing::Test {
  protected:
-  static constexpr std::size_t waiting_bytes = 1 << 20;
-
-  ServerTest() {
-    for (const char* file : {"index.html", "view.js", "view.css"})
-      std::ofstream(in_folder(file)) << "content of " << file;
-    ServerSettings settings;
-    settings.token = token_;
-    settings.page = in_folder("");
-    settings.hosts = {"workstation"};
-    settings.max_waiting_bytes = waiting_bytes;
-    pages_.emplace(viewed(), progress_);
-    server_.emplace(settings, *pages_);
-    const std::string url = server_->url();
-    port_ = url.substr(17, url.find('/', 17) - 17);
-    thread_ = std::thread([this] { server_->run(progress_); });
-  }
-  ~ServerTest() override {
-    progress_.cancelled = true;
-    thread_.join();
-    server_.reset();
-    pages_.reset();
-  }
-
   tcp::socket connect() {
     tcp::socket socket(io_);
     socket.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(std::stoi(port_))});
@@ -102,23 +86,24 @@ class ServerTest : public test::ViewTest {
     return test::received(message).json;
   }
 
-  /// Asks for a picture on a new socket.
-  void expect_alive() {
+  static void write_json(Socket& socket, const Json& json) { socket.write(asio::buffer(json.dump())); }
+
+  /// A new socket that has got the picture of a scene.
+  Socket socket_with_picture(const Json& scene = test::small_scene()) {
     Socket socket = open_socket();
     EXPECT_EQ(read_json(socket).at("type"), "hello");
-    socket.write(asio::buffer(Json{{"type", "scene"}, {"id", 1}, {"scene", test::small_scene()}}.dump()));
+    write_json(socket, {{"type", "scene"}, {"id", 1}, {"scene", scene}});
     for (Json json = Json::object(); !json.value("final", false);) json = read_json(socket);
+    return socket;
   }
 
   const std::string token_ = random_token();
-  std::string port_;
+  const ServerSettings settings_ = settings_of(token_);
+  test::RunningView view_{settings_};
+  const std::string port_ = view_.port();
   std::size_t read_bytes_ = 0;  ///< Of the last message.
 
  private:
-  Progress progress_;
-  std::optional<Pages> pages_;
-  std::optional<Server> server_;
-  std::thread thread_;
   asio::io_context io_;
 };
 
@@ -152,21 +137,17 @@ TEST_F(ServerTest, SendsAFileOfAnySize) {
   Json scene = test::small_scene();
   scene["receiver"]["resolution"] = {400, 400};  // Of 14 channels, of which some compress well.
   scene["light"]["photons"] = 2000;
-  Socket socket = open_socket();
-  EXPECT_EQ(read_json(socket).at("type"), "hello");
-  socket.write(asio::buffer(Json{{"type", "scene"}, {"id", 1}, {"scene", scene}}.dump()));
-  for (Json json = Json::object(); !json.value("final", false);) json = read_json(socket);
-  socket.write(asio::buffer(Json{{"type", "export"}, {"id", 2}, {"file", "exr"}}.dump()));
+  Socket socket = socket_with_picture(scene);
+  write_json(socket, {{"type", "export"}, {"id", 2}, {"file", "exr"}});
   // Answers that come behind the file wait for it; some may come before.
   constexpr int looks = 20;
-  for (int i = 0; i < looks; ++i)
-    socket.write(asio::buffer(Json{{"type", "look"}, {"id", 3}, {"x", 0.5}, {"y", 0.5}}.dump()));
+  for (int i = 0; i < looks; ++i) write_json(socket, {{"type", "look"}, {"id", 3}, {"x", 0.5}, {"y", 0.5}});
   std::map<std::string, int> answers;
   while (answers["file"] < 1 || answers["look"] < looks) {
     const Json json = read_json(socket);
     ++answers[json.value("type", "")];
     if (json.value("type", "") == "file") {
-      EXPECT_GT(read_bytes_, waiting_bytes);
+      EXPECT_GT(read_bytes_, settings_.max_waiting_bytes);
     }
     EXPECT_EQ(json.value("name", "scene.exr"), "scene.exr");
     ASSERT_NE(json.value("type", ""), "error") << json;
@@ -192,7 +173,7 @@ TEST_F(ServerTest, RefusesForeignHostAndOrigin) {
   for (const std::string& origin : {std::string("http://evil.example"), "https://" + own_host(), std::string("null"),
                                     "http://" + own_host() + ".evil.example", std::string()})
     EXPECT_THROW(open_socket(origin, path("socket")), boost::system::system_error) << origin;
-  expect_alive();
+  socket_with_picture();
 }
 
 TEST_F(ServerTest, SurvivesHostileBytes) {
@@ -203,12 +184,11 @@ TEST_F(ServerTest, SurvivesHostileBytes) {
   socket.binary(true);
   socket.write(asio::buffer(std::string("\xff\xfe\xfd")));
   socket.write(asio::buffer(std::string(Server::max_message_bytes + 1, ' ')));
-  EXPECT_THROW(
-      {
-        for (;;) read_json(socket);
-      },
-      boost::system::system_error);
-  expect_alive();
+  const auto read_on = [&] {
+    while (true) read_json(socket);
+  };
+  EXPECT_THROW(read_on(), boost::system::system_error);
+  socket_with_picture();
 }
 
 TEST_F(ServerTest, BoundsConnectionsAndPages) {
@@ -216,13 +196,12 @@ TEST_F(ServerTest, BoundsConnectionsAndPages) {
     std::vector<tcp::socket> idle;
     for (int i = 0; i < 1000; ++i) idle.push_back(connect());
   }
-  expect_alive();
+  socket_with_picture();
   std::vector<Socket> sockets;
-  EXPECT_THROW(
-      {
-        for (std::size_t i = 0; i < Server::max_pages + 2; ++i) sockets.push_back(open_socket());
-      },
-      boost::system::system_error);
+  const auto open_many = [&] {
+    while (sockets.size() < Server::max_pages + 2) sockets.push_back(open_socket());
+  };
+  EXPECT_THROW(open_many(), boost::system::system_error);
   EXPECT_GE(sockets.size(), Server::max_pages - 1);
 }
 
@@ -232,10 +211,10 @@ TEST_F(ServerTest, DoesNotWaitForASlowReader) {
   for (int id = 1; id <= 300; ++id) {
     Json scene = test::small_scene();
     scene["field"]["scale"] = 1 + 0.01 * id;
-    slow.write(asio::buffer(Json{{"type", "scene"}, {"id", id}, {"scene", scene}}.dump()));
-    slow.write(asio::buffer(Json{{"type", "space"}, {"id", id}}.dump()));
+    write_json(slow, {{"type", "scene"}, {"id", id}, {"scene", scene}});
+    write_json(slow, {{"type", "space"}, {"id", id}});
   }
-  expect_alive();
+  socket_with_picture();
 }
 
 }  // namespace

@@ -1,14 +1,17 @@
 #pragma once
-/// A small scene in a folder of its own, and messages of pages.
+/// A small scene in a folder of its own, a server of it, and messages of pages.
 
 #include <condition_variable>
 #include <cstring>
 #include <fstream>
 #include <mutex>
+#include <optional>
+#include <thread>
 
 #include "base/files/temporary_folder.h"
 #include "tests/names.h"
 #include "tools/viewer/pages.h"
+#include "tools/viewer/server/server.h"
 
 namespace tensorray::test {
 
@@ -19,9 +22,9 @@ inline Json small_scene() {
           {"integrator", {{"type", "photon_distribution"}}}};
 }
 
-class ViewTest : public ::testing::Test {
- protected:
-  ViewTest() { std::ofstream(scene_file()) << small_scene(); }
+class ViewFolder {
+ public:
+  ViewFolder() { std::ofstream(scene_file()) << small_scene(); }
 
   std::filesystem::path in_folder(const std::string& name) const { return folder_ / name; }
   std::filesystem::path scene_file() const { return in_folder("scene.json"); }
@@ -29,6 +32,35 @@ class ViewTest : public ::testing::Test {
 
  private:
   TemporaryFolder folder_;
+};
+
+/// A server of the small scene, which runs in a thread.
+class RunningView : public ViewFolder {
+ public:
+  explicit RunningView(ServerSettings settings) {
+    for (const char* file : {"index.html", "view.js", "view.css"})
+      std::ofstream(in_folder(file)) << "content of " << file;
+    settings.page = in_folder("");
+    pages_.emplace(viewed(), progress_);
+    server_.emplace(settings, *pages_);
+    const std::string url = server_->url(), before = "http://127.0.0.1:";
+    port_ = url.substr(before.size(), url.find('/', before.size()) - before.size());
+    thread_ = std::thread([this] { server_->run(progress_); });
+  }
+  ~RunningView() {
+    progress_.cancelled = true;
+    thread_.join();
+  }
+
+  Pages& pages() { return *pages_; }
+  const std::string& port() const { return port_; }
+
+ private:
+  Progress progress_;
+  std::optional<Pages> pages_;
+  std::optional<Server> server_;
+  std::string port_;
+  std::thread thread_;
 };
 
 /// A received message; of a binary one, `json` is the header.
@@ -43,6 +75,8 @@ inline Received received(const PageMessage& message) {
   std::memcpy(&size, message.data.data(), sizeof size);
   return {Json::parse(message.data.substr(4, size)), message.data.substr(4 + size)};
 }
+
+class ViewTest : public ::testing::Test, protected ViewFolder {};
 
 class Mailbox {
  public:

@@ -30,19 +30,36 @@ class OutputFileTest : public ::testing::Test {
     return all;
   }
 
+  std::vector<OutputFile> written(const std::vector<fs::path>& targets) const {
+    std::vector<OutputFile> files;
+    for (const fs::path& target : targets) files.emplace_back(folder_ / target);
+    for (const OutputFile& file : files) write_bytes(file.path(), "new");
+    return files;
+  }
+
   const TemporaryFolder temporary_;
   const fs::path folder_ = temporary_ / "";
 };
 
-TEST_F(OutputFileTest, AppearsWhenCommitted) {
-  OutputFile file(folder_ / "a.spectral.exr");
-  EXPECT_EQ(file.path().parent_path(), fs::canonical(folder_)) << "renaming works within one file system only";
-  EXPECT_EQ(file.path().extension(), ".exr");
-  write_bytes(file.path(), "new");
-  EXPECT_FALSE(fs::exists(file.target()));
-  file.commit();
-  EXPECT_EQ(bytes_of(folder_ / "a.spectral.exr"), "new");
-  EXPECT_EQ(names().size(), 1u) << "no temporary is left";
+TEST_F(OutputFileTest, ChangesWhenCommitted) {
+  const fs::path name = "a.spectral.exr";
+  for (const std::string old : {"", "old"})
+    for (const bool is_committed : {false, true}) {
+      fs::remove(folder_ / name);
+      if (!old.empty()) write_bytes(folder_ / name, old);
+      {
+        OutputFile file(folder_ / name);
+        EXPECT_EQ(file.path().parent_path(), fs::canonical(folder_)) << "renaming works within one file system only";
+        EXPECT_EQ(file.path().extension(), ".exr");
+        write_bytes(file.path(), "new");
+        EXPECT_NE(OutputFile(folder_ / name).path(), file.path()) << "two of one target do not meet";
+        EXPECT_EQ(fs::exists(file.target()), !old.empty());
+        if (is_committed) file.commit();
+      }
+      const std::string expected = is_committed ? "new" : old;
+      EXPECT_EQ(fs::exists(folder_ / name) ? bytes_of(folder_ / name) : "", expected);
+      EXPECT_EQ(names().size(), expected.empty() ? 0u : 1u) << "no temporary is left";
+    }
 }
 
 /// As of a shell's `>> log`: the file is not replaced, but gets more bytes.
@@ -65,29 +82,10 @@ TEST_F(OutputFileTest, AppendsToWhatTheProcessHasOpen) {
   EXPECT_THROW(OutputFile("/dev/fd/" + std::to_string(reading.get())), std::runtime_error);
 }
 
-TEST_F(OutputFileTest, LeavesTheOldFileUntilCommitted) {
-  write_bytes(folder_ / "a.png", "old");
-  {
-    OutputFile file(folder_ / "a.png");
-    write_bytes(file.path(), "half");
-    EXPECT_EQ(bytes_of(folder_ / "a.png"), "old");
-  }
-  EXPECT_EQ(bytes_of(folder_ / "a.png"), "old");
-  EXPECT_EQ(names(), std::vector<std::string>{"a.png"});
-}
-
-TEST_F(OutputFileTest, TwoOfOneTargetDoNotMeet) {
-  OutputFile first(folder_ / "a.png"), second(folder_ / "a.png");
-  EXPECT_NE(first.path(), second.path());
-}
-
 TEST_F(OutputFileTest, Moves) {
-  std::vector<OutputFile> files;
-  files.emplace_back(folder_ / "a.png");
-  files.emplace_back(folder_ / "b.png");
+  std::vector<OutputFile> files = written({"a.png", "b.png"});
   files.erase(files.begin());
   ASSERT_EQ(names().size(), 1u) << "the temporary of a.png is gone, that of b.png is not";
-  write_bytes(files[0].path(), "b");
   commit_all(files);
   EXPECT_EQ(names(), std::vector<std::string>{"b.png"});
   EXPECT_THROW(files[0].commit(), std::logic_error);
@@ -150,10 +148,7 @@ TEST_F(OutputFileTest, AFullDeviceIsAnErrorAndStaysADevice) {
 TEST_F(OutputFileTest, DevicesAreFirst) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
   write_bytes(folder_ / "a.png", "old");
-  std::vector<OutputFile> files;
-  files.emplace_back(folder_ / "a.png");
-  files.emplace_back("/dev/full");
-  for (const OutputFile& file : files) write_bytes(file.path(), "new");
+  std::vector<OutputFile> files = written({"a.png", "/dev/full"});
   EXPECT_THROW(commit_all(files), std::runtime_error);
   EXPECT_EQ(bytes_of(folder_ / "a.png"), "old");
 }
@@ -162,12 +157,7 @@ TEST_F(OutputFileTest, AllFilesChangeOrNone) {
   write_bytes(folder_ / "a", "old a");
   write_bytes(folder_ / "c", "old c");
   fs::create_directories(folder_ / "other");
-  std::vector<OutputFile> files;
-  files.emplace_back(folder_ / "a");
-  files.emplace_back(folder_ / "b");
-  files.emplace_back(folder_ / "other/d");
-  files.emplace_back(folder_ / "c");
-  for (const OutputFile& file : files) write_bytes(file.path(), "new");
+  std::vector<OutputFile> files = written({"a", "b", "other/d", "c"});
   fs::remove(files[2].path());  // The third of four cannot take its name.
   EXPECT_THROW(commit_all(files), std::runtime_error);
   files.clear();
@@ -180,10 +170,7 @@ TEST_F(OutputFileTest, AllFilesChangeOrNone) {
 TEST_F(OutputFileTest, CommittingSeveralFilesLeavesNothingElse) {
   write_bytes(folder_ / "a", "old");
   fs::permissions(folder_ / "a", fs::perms::owner_read | fs::perms::owner_write);
-  std::vector<OutputFile> files;
-  files.emplace_back(folder_ / "a");
-  files.emplace_back(folder_ / "b");
-  for (const OutputFile& file : files) write_bytes(file.path(), "new");
+  std::vector<OutputFile> files = written({"a", "b"});
   commit_all(files);
   EXPECT_EQ(bytes_of(folder_ / "a"), "new");
   EXPECT_EQ(bytes_of(folder_ / "b"), "new");
@@ -194,12 +181,12 @@ TEST_F(OutputFileTest, CommittingSeveralFilesLeavesNothingElse) {
 TEST_F(OutputFileTest, TargetsThatCannotBe) {
   write_bytes(folder_ / "file", "");
   fs::create_symlink("loop", folder_ / "loop");
-  EXPECT_THAT(message([&] { OutputFile file(folder_); }), HasSubstr("is a folder; give the name of a file"));
-  EXPECT_THAT(message([&] { OutputFile file(folder_ / "x/"); }), HasSubstr("is a folder"));
-  EXPECT_THAT(message([&] { OutputFile file(folder_ / "no/a.png"); }), HasSubstr("there is no folder"));
-  EXPECT_THAT(message([&] { OutputFile file(folder_ / "file/a.png"); }), HasSubstr("there is no folder"));
-  EXPECT_THAT(message([&] { OutputFile file(folder_ / "loop"); }), HasSubstr("loop of symbolic links"));
-  EXPECT_THAT(message([&] { OutputFile file(""); }), HasSubstr("name of a file"));
+  const std::vector<std::pair<fs::path, const char*>> cases{
+      {folder_, "is a folder; give the name of a file"}, {folder_ / "x/", "is a folder"},
+      {folder_ / "no/a.png", "there is no folder"},      {folder_ / "file/a.png", "there is no folder"},
+      {folder_ / "loop", "loop of symbolic links"},      {"", "name of a file"}};
+  for (const auto& [target, error] : cases)
+    EXPECT_THAT(message([target = target] { OutputFile file(target); }), HasSubstr(error));
 }
 
 TEST_F(OutputFileTest, WriteProtection) {

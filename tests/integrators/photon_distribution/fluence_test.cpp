@@ -7,31 +7,20 @@
 #include "integrators/scene/field_region.h"
 #include "renderer/light_maps/photon_tracer.h"
 #include "renderer/sampling/random.h"
-#include "tests/tracing/support.h"
+#include "tests/tracing/flow_support.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
 namespace {
 
-/// A volume in parallel light, and a plate behind it.
-struct FluenceBench {
-  TensorField field;
-  Geometry geometry;
-  Beam beam;
-};
-
-FluenceBench make_bench(TensorField field, const Vector3d& direction, Surfaces extra = {}) {
-  Surfaces surfaces = std::move(extra);
-  surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
-  surfaces.plate = plate_across(direction, 9);
-  Beam beam = silhouette_beam(field.corners(), direction.normalized(), Vector3d::UnitY());
-  return {std::move(field), Geometry(std::move(surfaces)), std::move(beam)};
+LightBench bench_of(TensorField field, const Vector3d& direction, Surfaces extra = {}) {
+  return make_bench(std::move(field), plate_across(direction, 9), std::move(extra), direction);
 }
 
 /// The weights are different and sum to 1.
 std::vector<LightChannel> channels() { return {{0.1, 650, 0.5}, {0.2, 550, 0.125}, {-0.3, 450, 0.375}}; }
 
-PhotonDistribution distribute(const FluenceBench& bench, FluenceKind kind, std::uint64_t photons, BeamPattern pattern,
+PhotonDistribution distribute(const LightBench& bench, FluenceKind kind, std::uint64_t photons, BeamPattern pattern,
                               int channels_per_photon = 0) {
   PhotonSettings settings;
   settings.photons = photons;
@@ -41,8 +30,6 @@ PhotonDistribution distribute(const FluenceBench& bench, FluenceKind kind, std::
   settings.channels_per_photon = channels_per_photon;
   return distribute_photons(bench.field, bench.geometry, bench.beam, channels(), settings, Progress());
 }
-
-Matrix3d no_bending(const Vector3d&) { return Matrix3d::Zero(); }
 
 /// Visits the voxels with light: visit(voxel, value).
 template <class Visit>
@@ -66,7 +53,7 @@ double sum(const TensorField& field, const ScalarGrid& grid) {
 }
 
 TEST(Fluence, OfStraightLightIsOneAtEveryVoxel) {
-  const FluenceBench bench = make_bench(cube_field(9, no_bending), {0, 0, -1});
+  const LightBench bench = bench_of(cube_field(9, zero), {0, 0, -1});
   // 64 × 64 rays: 8 across a voxel along each axis, 4 across the half voxels at the sides.
   const auto grids = distribute(bench, FluenceKind::bands, 64 * 64, BeamPattern::grid).fluence;
   ASSERT_EQ(grids.size(), 4u);
@@ -83,7 +70,7 @@ TEST(Fluence, OfStraightLightIsOneAtEveryVoxel) {
 }
 
 /// Σ power · length in the volume, of each channel, by tracing the same rays and recording their complete records.
-std::vector<double> lengths_by_channel(const FluenceBench& bench, std::uint64_t photons, BeamPattern pattern) {
+std::vector<double> lengths_by_channel(const LightBench& bench, std::uint64_t photons, BeamPattern pattern) {
   const BeamSampler positions(bench.beam, pattern, photons, 0);
   std::vector<double> lengths(channels().size());
   Emission emission;
@@ -103,15 +90,12 @@ std::vector<double> lengths_by_channel(const FluenceBench& bench, std::uint64_t 
 }
 
 TEST(Fluence, SumsToPowerTimesLengthOfTheWaysInTheVolume) {
-  Surfaces obstacle;
-  obstacle.obstacles.push_back(
-      box_mesh(Eigen::AlignedBox3d(Vector3d(-0.3, -0.3, -0.3), Vector3d(0.2, 0.2, 0.2)), Affine3d::Identity()));
   Affine3d placement = Affine3d::Identity();
   placement.linear() = Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-  const FluenceBench bench =
-      make_bench(cube_field(
-                     20, [](const Vector3d& p) { return Matrix3d(4 * linear_tensor(p)); }, placement),
-                 {0.2, 0.1, -1}, std::move(obstacle));
+  const LightBench bench =
+      bench_of(cube_field(
+                   20, [](const Vector3d& p) { return Matrix3d(4 * linear_tensor(p)); }, placement),
+               {0.2, 0.1, -1}, obstacle_between({-0.3, -0.3, -0.3}, {0.2, 0.2, 0.2}));
   const PhotonDistribution light = distribute(bench, FluenceKind::bands, 1000, BeamPattern::sobol);
   const std::vector<double> lengths = lengths_by_channel(bench, 1000, BeamPattern::sobol);
   double all = 0;
@@ -126,9 +110,8 @@ TEST(Fluence, SumsToPowerTimesLengthOfTheWaysInTheVolume) {
 }
 
 TEST(Fluence, CountsLightThatIsStraightBesideACutAndMissesThePlate) {
-  Surfaces cut;
-  cut.cut = box_mesh(Eigen::AlignedBox3d(Vector3d::Constant(-0.55), Vector3d::Constant(0.55)), Affine3d::Identity());
-  FluenceBench bench = make_bench(cube_field(9, no_bending), {0, 0, -1}, std::move(cut));
+  Surfaces cut = cut_between(Vector3d::Constant(-0.55), Vector3d::Constant(0.55));
+  LightBench bench = bench_of(cube_field(9, zero), {0, 0, -1}, std::move(cut));
   Surfaces surfaces = bench.geometry.surfaces();
   surfaces.plate->size = {0.3, 0.3};
   bench.geometry = Geometry(surfaces);
@@ -160,8 +143,8 @@ TensorGrid corner_blocks(int size, bool filled) {
 }
 
 TEST(Fluence, OfASparseFieldIsThatOfAFullOneAtTheFieldsBlocks) {
-  const FluenceBench sparse = make_bench(TensorField(corner_blocks(40, false)), {0.1, 0.2, -1});
-  const FluenceBench full = make_bench(TensorField(corner_blocks(40, true)), {0.1, 0.2, -1});
+  const LightBench sparse = bench_of(TensorField(corner_blocks(40, false)), {0.1, 0.2, -1});
+  const LightBench full = bench_of(TensorField(corner_blocks(40, true)), {0.1, 0.2, -1});
   const ScalarGrid found = distribute(sparse, FluenceKind::all_light, 5000, BeamPattern::stratified).fluence[0];
   const ScalarGrid all = distribute(full, FluenceKind::all_light, 5000, BeamPattern::stratified).fluence[0];
   std::map<std::array<int, 3>, const ScalarBlock*> blocks;
@@ -204,15 +187,6 @@ constexpr double height = -0.3;  // Of a floor within the volume.
 constexpr double flexibility = 0.6;
 const Vector3d along = Vector3d(0.15, -0.1, -1).normalized();
 
-/// A smooth field that focuses and turns light.
-TensorField lens_field() {
-  return cube_field(17, [](const Vector3d& p) {
-    Matrix3d T;
-    T << 0.4 * p.x(), 0.1, -p.x(), 0, 0.5, -0.8 * p.y(), 0.5 - p.x(), -p.y(), -0.3;
-    return T;
-  });
-}
-
 TriangleMesh floor_mesh() { return rectangle_mesh({0, 0, height}, {1, 0, 0}, {0, 1, 0}, {6, 6}); }
 
 Geometry geometry_with_floor(const TensorField& field) {
@@ -222,14 +196,13 @@ Geometry geometry_with_floor(const TensorField& field) {
 }
 
 SurfaceScene floor_scene() {
-  std::vector<ShadedSurface> surfaces(1);
-  surfaces[0].shape = floor_mesh();
-  return SurfaceScene(std::move(surfaces));
+  ShadedSurface surface;
+  surface.shape = floor_mesh();
+  return SurfaceScene({surface});
 }
 
 /// The power on the floor's squares of 0.25 × 0.25 about the origin, by photons.
-std::vector<double> photons_on_floor(const TensorField& field, double strength, Conserve conserve,
-                                     const Light& light = DirectionalLight{along, {1}}) {
+std::vector<double> photons_on_floor(const TensorField& field, double strength, Conserve conserve) {
   const Geometry geometry = geometry_with_floor(field);
   FieldViewSettings view;
   view.conserve = conserve;
@@ -239,7 +212,8 @@ std::vector<double> photons_on_floor(const TensorField& field, double strength, 
   settings.per_pass = 60000;
   settings.radius = 0.01;
   settings.serves = [](int, std::uint32_t) { return true; };
-  const PhotonMaps photons = trace_photons(region, field.corners(), floor_scene(), {light}, settings, {});
+  const PhotonMaps photons =
+      trace_photons(region, field.corners(), floor_scene(), {DirectionalLight{along, {1}}}, settings, {});
   std::vector<double> power(64);
   for (const Photon& photon : photons.passes[0].photons()) {
     const Eigen::Array2i square = ((photon.position.head<2>().array() + 1) / 0.25f).floor().cast<int>();
@@ -266,13 +240,12 @@ RayBatch sun_rays(double& power) {
 /// The same by rays one by one in double precision, if power is conserved and if radiance is.
 struct OnFloor {
   std::vector<double> power = std::vector<double>(64), radiance = power;
-  const std::vector<double>& where(Conserve conserve) const { return conserve == Conserve::power ? power : radiance; }
 };
 
-OnFloor rays_on_floor(const TensorField& field, RayBatch (*rays_of)(double&)) {
+OnFloor rays_on_floor(const TensorField& field) {
   const Geometry geometry = geometry_with_floor(field);
   double power_of_ray = 0;
-  RayBatch rays = rays_of(power_of_ray);
+  RayBatch rays = sun_rays(power_of_ray);
   rays.wants_log_radiance_scale = true;
   trace_reference(field, geometry, {}, rays);
   OnFloor floor;
@@ -300,10 +273,10 @@ double difference(const std::vector<double>& a, const std::vector<double>& b) {
 
 /// A square has about 1000 rays: 3% noise each, 64 squares.
 TEST(FieldPhotonsTest, AFloorWithinTheVolumeHasTheLightOfForwardRays) {
-  const TensorField field = lens_field();
-  const OnFloor truth = rays_on_floor(field, sun_rays);
-  for (const Conserve conserve : {Conserve::power, Conserve::radiance})
-    EXPECT_LT(difference(photons_on_floor(field, flexibility, conserve), truth.where(conserve)), 0.2);
+  const TensorField field = cube_field(17, focusing_tensor);
+  const OnFloor truth = rays_on_floor(field);
+  EXPECT_LT(difference(photons_on_floor(field, flexibility, Conserve::power), truth.power), 0.2);
+  EXPECT_LT(difference(photons_on_floor(field, flexibility, Conserve::radiance), truth.radiance), 0.2);
   // The wrong sign, and the wrong law.
   EXPECT_GT(difference(photons_on_floor(field, -flexibility, Conserve::power), truth.power), 0.5);
   EXPECT_GT(difference(truth.radiance, truth.power), 0.3);

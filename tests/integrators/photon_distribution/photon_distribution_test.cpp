@@ -6,29 +6,16 @@
 
 #include "integrators/photon_distribution/photon_chunks.h"
 #include "tests/base/rank_support.h"
-#include "tests/tracing/support.h"
+#include "tests/tracing/flow_support.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
 namespace {
 
-/// A cube in parallel light along −z, and a plate behind it.
-struct Bench {
-  TensorField field;
-  Geometry geometry;
-  Beam beam;
-
-  static Bench make(const TensorFunction& tensor, double plate_size, int resolution, Surfaces extra = {}) {
-    TensorField field = cube_field(9, tensor);
-    Surfaces surfaces = std::move(extra);
-    surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
-    surfaces.plate = plate_across({0, 0, -1}, 1.5);
-    surfaces.plate->size = {plate_size, plate_size};
-    surfaces.plate->resolution = {resolution, resolution};
-    Beam beam = silhouette_beam(field.corners(), {0, 0, -1}, Vector3d::UnitY());
-    return {std::move(field), Geometry(std::move(surfaces)), std::move(beam)};
-  }
-};
+/// The middle of the plate is 1.5 from that of the volume.
+LightBench make_bench(const TensorFunction& tensor, double plate_size, int resolution, Surfaces extra = {}) {
+  return test::make_bench(tensor, plate_at(1.5, plate_size, resolution), std::move(extra), 9);
+}
 
 std::vector<LightChannel> channels(int count) {
   std::vector<LightChannel> result;
@@ -37,23 +24,13 @@ std::vector<LightChannel> channels(int count) {
   return result;
 }
 
-PhotonDistribution distribute(const Bench& bench, const std::vector<LightChannel>& light, PhotonSettings settings) {
+PhotonDistribution distribute(const LightBench& bench, const std::vector<LightChannel>& light,
+                              PhotonSettings settings) {
   return distribute_photons(bench.field, bench.geometry, bench.beam, light, settings, Progress());
 }
 
-Matrix3d zero(const Vector3d&) { return Matrix3d::Zero(); }
-
-std::uint64_t ended(const EndCounts& counts) {
-  std::uint64_t sum = 0;
-  for (const std::uint64_t count : counts) sum += count;
-  return sum;
-}
-
 TEST(PhotonDistribution, EveryRayIsAccountedFor) {
-  Surfaces extra;
-  extra.obstacles.push_back(
-      box_mesh(Eigen::AlignedBox3d(Vector3d(-0.3, -0.3, -0.3), Vector3d(0.2, 0.2, 0.2)), Eigen::Affine3d::Identity()));
-  const Bench bench = Bench::make(linear_tensor, 1.5, 32, std::move(extra));
+  const LightBench bench = make_bench(linear_tensor, 1.5, 32, obstacle_between({-0.3, -0.3, -0.3}, {0.2, 0.2, 0.2}));
   PhotonSettings settings;
   settings.photons = 3000;
   for (const DensityKind kind : {DensityKind::gaussian, DensityKind::histogram, DensityKind::photon_differential}) {
@@ -63,7 +40,7 @@ TEST(PhotonDistribution, EveryRayIsAccountedFor) {
     for (int channel = 0; channel < 4; ++channel) {
       const EndCounts& ends = light.ends[channel];
       EXPECT_EQ(light.emitted[channel], light.positions);
-      EXPECT_EQ(ended(ends), light.emitted[channel]);
+      EXPECT_EQ(std::accumulate(ends.begin(), ends.end(), std::uint64_t{0}), light.emitted[channel]);
       for (const RayEnd end : {RayEnd::plate, RayEnd::missed, RayEnd::obstacle})
         EXPECT_GT(ends[static_cast<int>(end)], 0u) << to_string(end);
       double on_film = 0;
@@ -77,7 +54,7 @@ TEST(PhotonDistribution, EveryRayIsAccountedFor) {
 }
 
 TEST(PhotonDistribution, SomeChannelsPerPhotonEstimateTheSame) {
-  const Bench bench = Bench::make(linear_tensor, 2.5, 32);
+  const LightBench bench = make_bench(linear_tensor, 2.5, 32);
   PhotonSettings settings;
   settings.photons = 40000;
   settings.density.tau = 3;
@@ -99,7 +76,7 @@ TEST(PhotonDistribution, SomeChannelsPerPhotonEstimateTheSame) {
 }
 
 TEST(PhotonDistribution, InColourItIsTheChannelsColoured) {
-  const Bench bench = Bench::make(linear_tensor, 2.5, 48);
+  const LightBench bench = make_bench(linear_tensor, 2.5, 48);
   PhotonSettings settings;
   settings.photons = 5000;
   settings.channels_per_photon = 4;
@@ -120,7 +97,7 @@ TEST(PhotonDistribution, InColourItIsTheChannelsColoured) {
 }
 
 TEST(PhotonDistribution, KeepsPhotonsIfAsked) {
-  const Bench bench = Bench::make(linear_tensor, 2.5, 32);
+  const LightBench bench = make_bench(linear_tensor, 2.5, 32);
   PhotonSettings settings;
   settings.photons = 300;
   settings.keep_photons = true;
@@ -143,7 +120,7 @@ TEST(PhotonDistribution, KeepsPhotonsIfAsked) {
 }
 
 TEST(PhotonDistribution, StopsWhenCancelledAndReportsProgress) {
-  const Bench bench = Bench::make(zero, 1.2, 16);
+  const LightBench bench = make_bench(zero, 1.2, 16);
   PhotonSettings settings;
   settings.photons = 20000;
   Progress progress;
@@ -169,30 +146,16 @@ const std::vector<LightChannel>& unit_channels() {
   return four;
 }
 
-struct SharedBench {
-  TensorField field = cube_field(9, linear_tensor);
-  Geometry geometry{surfaces()};
-  Beam beam = silhouette_beam(field.corners(), {0, 0, -1}, Vector3d::UnitY());
-
-  Surfaces surfaces() const {
-    Surfaces surfaces = surfaces_of(field);
-    surfaces.plate = plate_across({0, 0, -1}, 1.5);
-    surfaces.plate->size = {2.5, 2.5};
-    surfaces.plate->resolution = {24, 24};
-    return surfaces;
-  }
-};
-
-const SharedBench& bench() {
-  static const SharedBench one;
+const LightBench& bench() {
+  static const LightBench one = make_bench(linear_tensor, 2.5, 24);
   return one;
 }
 
-/// Light that has seven chunks.
+/// Light that has four chunks.
 PhotonSettings settings_of(DensityKind kind) {
   PhotonSettings settings;
   settings.bending.step = 2;
-  settings.photons = 400000;
+  settings.photons = 200000;
   settings.channels_per_photon = 1;
   settings.density.kind = kind;
   settings.keep_photons = true;
@@ -256,12 +219,6 @@ TEST(KeptPhotons, WantTheOutputsOfTheirBeginning) {
   expect_refused(all, {{of_all.begin()->first, std::make_shared<const std::string>("damaged")}});
 }
 
-double sum_of(const Film& film) {
-  double sum = 0;
-  for (const double value : film.values) sum += value;
-  return sum;
-}
-
 /// Random positions fill the whole beam at once: the picture so far is as bright as the whole. Rows do not.
 TEST(KeptPhotons, PicturesSoFarAreAsBrightAsTheirLight) {
   PhotonSettings settings = settings_of(DensityKind::gaussian);
@@ -277,9 +234,9 @@ TEST(KeptPhotons, PicturesSoFarAreAsBrightAsTheirLight) {
     EXPECT_LT(part, 0.5);
     EXPECT_GT(first->photons.size(), 0u);
     if (pattern == BeamPattern::random)
-      EXPECT_NEAR(sum_of(first->irradiance) / sum_of(all.irradiance), 1, 0.02);
+      EXPECT_NEAR(test::sum(first->irradiance.values) / test::sum(all.irradiance.values), 1, 0.02);
     else
-      EXPECT_LT(sum_of(first->irradiance), 0.6 * sum_of(all.irradiance));
+      EXPECT_LT(test::sum(first->irradiance.values), 0.6 * test::sum(all.irradiance.values));
   }
 }
 

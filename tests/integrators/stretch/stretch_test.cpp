@@ -86,9 +86,7 @@ TEST(Stretch, IsThatOfNeighbouringRaysAtEqualLengths) {
 
 TEST(Stretch, IsNoneWhereLightDoesNotComeSoFar) {
   const TensorField field = constant_field(Matrix3d::Zero());
-  Surfaces obstacle;
-  obstacle.obstacles.push_back(
-      box_mesh(Eigen::AlignedBox3d(Vector3d(-0.3, -0.3, -0.3), Vector3d(0.3, 0.3, 0)), Eigen::Affine3d::Identity()));
+  const Surfaces obstacle = obstacle_between({-0.3, -0.3, -0.3}, {0.3, 0.3, 0});
   EXPECT_TRUE(std::isnan(stretch_at(field, along_minus_z(1), {0, 0, 0.9}, 0.5, obstacle)));
   EXPECT_NEAR(stretch_at(field, along_minus_z(0.8), {0, 0, 0.9}, 0.5, obstacle), 0, 1e-7);
   EXPECT_TRUE(std::isnan(stretch_at(field, along_minus_z(0.8), {0, 0, -0.1}, 0.5, obstacle))) << "in the obstacle";
@@ -141,9 +139,8 @@ TEST(Stretch, RefusesSettingsOutOfRangeAndStopsWhenCancelled) {
   const TensorField field = constant_field(Matrix3d::Zero());
   const Geometry geometry(surfaces_of(field));
   Progress progress;
-  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(0), 9, progress), std::invalid_argument);
-  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(-1), 9, progress), std::invalid_argument);
-  EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(INFINITY), 9, progress), std::invalid_argument);
+  for (const double length : {0.0, -1.0, double{INFINITY}})
+    EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(length), 9, progress), std::invalid_argument);
   EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(1), 1, progress), std::invalid_argument);
   progress.cancelled = true;
   EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(1), 9, progress), Cancelled);

@@ -13,23 +13,9 @@ namespace {
 /// Closed, convex and outwards.
 using Parts = std::vector<TriangleMesh>;
 
-TriangleMesh joined(const Parts& parts) {
-  TriangleMesh all;
-  for (const TriangleMesh& part : parts) {
-    const auto first = static_cast<std::uint32_t>(all.vertices.size());
-    all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
-    for (const auto& t : part.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
-  return all;
-}
-
-TriangleMesh box_part(const Vector3d& low, const Vector3d& high) {
-  return box_mesh(Eigen::AlignedBox3d(low, high), Eigen::Affine3d::Identity());
-}
-
 /// The same box with the other diagonal on each face, which mirroring makes.
 TriangleMesh mirrored_part(const Vector3d& low, const Vector3d& high) {
-  TriangleMesh box = box_part({-high.x(), low.y(), low.z()}, {-low.x(), high.y(), high.z()});
+  TriangleMesh box = box_between({-high.x(), low.y(), low.z()}, {-low.x(), high.y(), high.z()});
   for (Vector3d& vertex : box.vertices) vertex.x() = -vertex.x();
   for (auto& triangle : box.triangles) std::swap(triangle[0], triangle[1]);
   return box;
@@ -67,7 +53,7 @@ Parts cells(const Vector3d& low, const Vector3d& high, int count) {
   for (int i = 0; i < count * count * count; ++i) {
     const Vector3i cell(i / count / count, i / count % count, i % count);
     const Vector3d from = low + cell.cast<double>().cwiseProduct(edge);
-    parts.push_back(cell.sum() % 2 ? mirrored_part(from, from + edge) : box_part(from, from + edge));
+    parts.push_back(cell.sum() % 2 ? mirrored_part(from, from + edge) : box_between(from, from + edge));
   }
   return parts;
 }
@@ -86,7 +72,7 @@ double length_within(const Parts& parts, const Vector3d& from, const Vector3d& a
     }
     return range;
   };
-  const auto volume = within(box_part(Vector3d::Constant(-1), Vector3d::Ones()), more);
+  const auto volume = within(box_between(Vector3d::Constant(-1), Vector3d::Ones()), more);
   std::vector<std::pair<double, double>> ranges;
   for (const TriangleMesh& part : parts) {
     const auto range = within(part, more);
@@ -118,24 +104,24 @@ std::vector<CutCase> cut_cases() {
   const Vector3d half = Vector3d::Constant(0.5), one = Vector3d::Ones();
   const auto column = [](double x, double width, bool mirrored = false) {
     const Vector3d low(x, -0.5, -0.5), high(x + width, 0.5, 0.5);
-    return mirrored ? mirrored_part(low, high) : box_part(low, high);
+    return mirrored ? mirrored_part(low, high) : box_between(low, high);
   };
   Parts with_ball = cells(-half, half, 2);
   with_ball.push_back(ball_part({0.25, 0, 0.5}, 0.4));
   return {
-      {"a box", {box_part(-half, half)}},
-      {"a box that fills the volume", {box_part(-one, one)}},
-      {"a box beyond the volume", {box_part(-2 * one, 1.1 * one)}},
-      {"a layer of the volume", {box_part({-1, -1, -0.125}, {1, 1, 0.125})}},
+      {"a box", {box_between(-half, half)}},
+      {"a box that fills the volume", {box_between(-one, one)}},
+      {"a box beyond the volume", {box_between(-2 * one, 1.1 * one)}},
+      {"a layer of the volume", {box_between({-1, -1, -0.125}, {1, 1, 0.125})}},
       {"a ball", {ball_part({0, 0, 0}, 0.75)}},
-      {"a box twice", {box_part(-half, half), box_part(-half, half)}},
-      {"a box twice, other diagonals", {box_part(-half, half), mirrored_part(-half, half)}},
+      {"a box twice", {box_between(-half, half), box_between(-half, half)}},
+      {"a box twice, other diagonals", {box_between(-half, half), mirrored_part(-half, half)}},
       {"touching boxes", {column(-0.5, 0.5), column(0, 0.5)}},
       {"touching boxes, other diagonals", {column(-0.5, 0.5), column(0, 0.5, true)}},
       {"overlapping boxes", {column(-0.5, 0.6), column(-0.1, 0.6, true)}},
-      {"boxes with an edge in common", {box_part(-half, {0, 0, 0.5}), box_part({0, 0, -0.5}, half)}},
-      {"boxes with a vertex in common", {box_part(-half, {0, 0, 0}), box_part({0, 0, 0}, half)}},
-      {"a box in a box", {box_part(-half, half), box_part(-half / 2, half / 2)}},
+      {"boxes with an edge in common", {box_between(-half, {0, 0, 0.5}), box_between({0, 0, -0.5}, half)}},
+      {"boxes with a vertex in common", {box_between(-half, {0, 0, 0}), box_between({0, 0, 0}, half)}},
+      {"a box in a box", {box_between(-half, half), box_between(-half / 2, half / 2)}},
       {"balls that touch", {ball_part({-0.4, 0, 0}, 0.4), ball_part({0.4, 0, 0}, 0.4)}},
       {"cells that fill the volume", cells(-one, one, 4)},
       {"cells and a ball", with_ball},
@@ -283,7 +269,7 @@ TEST(CutWithInnerFaces, BendsLightAsItsSkinDoes) {
   inner = skin;
   for (RayBatch* const batch : {&skin, &inner}) {
     Surfaces surfaces = surfaces_of(field);
-    surfaces.cut = batch == &skin ? box_part(-half, half) : joined(cells(-half, half, 3));
+    surfaces.cut = batch == &skin ? box_between(-half, half) : joined(cells(-half, half, 3));
     trace(field, Geometry(std::move(surfaces)), {}, *batch);
   }
   for (std::size_t i = 0; i < skin.size(); ++i) {

@@ -6,8 +6,6 @@
 namespace tensorray {
 namespace {
 
-using test::Ray;
-
 /// One ray with its derivatives along the two axes across its direction.
 struct Traced {
   Ray ray;
@@ -56,7 +54,7 @@ RayDifferential finite_differences(const TensorField& field, const Geometry& geo
       const double d = sign ? delta : -delta;
       const Vector3d position = start.position_at(i == 0 ? d : 0, i == 1 ? d : 0);
       const Vector3d direction = start.direction_at(i == 0 ? d : 0, i == 1 ? d : 0);
-      side[sign] = test::trace_one(field, geometry, settings, position, direction, flexibility);
+      side[sign] = trace_one(field, geometry, settings, position, direction, flexibility);
       EXPECT_EQ(side[sign].end, RayEnd::plate);
     }
     result.position.col(i) = (side[1].position - side[0].position) / (2 * delta);
@@ -75,14 +73,14 @@ void expect_equal(const RayDifferential& a, const RayDifferential& b, double tol
 class RayDifferentials : public ::testing::TestWithParam<BendingMethod> {
  protected:
   // Linear in position, so that interpolation is exact and has no kinks at the faces of cells.
-  const TensorField field_ = test::cube_field(17, test::linear_tensor);
+  const TensorField field_ = cube_field(17, linear_tensor);
   const Vector3d direction_ = Vector3d(0.2, -0.3, -1).normalized();
   const Start outside_ = make_start(Vector3d(0.1, 0.2, 2), direction_, 0.3);
 
   // Differentials are the derivatives of the steps. They are exact between surfaces; at a surface they have the
   // method's order.
   BendingSettings settings() const {
-    BendingSettings settings = test::settings_of(GetParam(), GetParam() == BendingMethod::euler ? 1.0 / 128 : 0.25);
+    BendingSettings settings = settings_of(GetParam(), GetParam() == BendingMethod::euler ? 1.0 / 128 : 0.25);
     settings.tolerance = 1e-7;
     return settings;
   }
@@ -91,7 +89,7 @@ class RayDifferentials : public ::testing::TestWithParam<BendingMethod> {
   void expect_finite_differences(const Geometry& geometry, const Start& start, double flexibility) {
     const Traced traced = trace_with_differential(field_, geometry, settings(), start, flexibility);
     ASSERT_EQ(traced.ray.end, RayEnd::plate);
-    const Ray alone = test::trace_one(field_, geometry, settings(), start.position, start.direction, flexibility);
+    const Ray alone = trace_one(field_, geometry, settings(), start.position, start.direction, flexibility);
     EXPECT_LT((traced.ray.position - alone.position).norm(), 1e-9) << "differentials must not change the ray";
     expect_equal(traced.differential, finite_differences(field_, geometry, settings(), start, flexibility, 1e-4),
                  tolerance());
@@ -99,9 +97,9 @@ class RayDifferentials : public ::testing::TestWithParam<BendingMethod> {
 };
 
 TEST_P(RayDifferentials, MatchFiniteDifferences) {
-  Surfaces behind = test::surfaces_of(field_), tilted = behind;
-  behind.plate = test::plate_across(direction_, 3);
-  tilted.plate = test::plate_across(Vector3d(0.5, 0.1, -1), 0.4);  // Inside the volume.
+  Surfaces behind = surfaces_of(field_), tilted = behind;
+  behind.plate = plate_across(direction_, 3);
+  tilted.plate = plate_across(Vector3d(0.5, 0.1, -1), 0.4);  // Inside the volume.
   Surfaces cut = behind;
   Eigen::Affine3d turned = Eigen::Affine3d::Identity();
   turned.linear() = Eigen::AngleAxisd(0.5, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
@@ -117,10 +115,8 @@ INSTANTIATE_TEST_SUITE_P(EveryMethod, RayDifferentials,
 /// T = diag(a, b, 0): light along the z axis stays on it, and a beam near the axis spreads by δV' = s diag(a, b) δV.
 /// For parallel light δV begins at 0, so that it stays parallel. A beam that is not parallel is magnified.
 TEST(RayDifferential, ParallelLightAlongAnEigenvectorStaysParallel) {
-  const TensorField field = test::constant_field(Eigen::Vector3d(0.75, -0.5, 0).asDiagonal());
-  Surfaces surfaces = test::surfaces_of(field);
-  surfaces.plate = test::plate_across(-Vector3d::UnitZ(), 2);
-  const Geometry geometry(surfaces);
+  const TensorField field = constant_field(Eigen::Vector3d(0.75, -0.5, 0).asDiagonal());
+  const Geometry geometry = geometry_with(field, plate_across(-Vector3d::UnitZ(), 2));
   const BendingSettings settings;
   const Traced parallel =
       trace_with_differential(field, geometry, settings, make_start({0, 0, 2}, -Vector3d::UnitZ(), 0), 1);
@@ -141,13 +137,10 @@ TEST(RayDifferential, ParallelLightAlongAnEigenvectorStaysParallel) {
 
 /// Strong kicks use another branch of the exponential.
 TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
-  const TensorField field = test::cube_field(17, test::linear_tensor);
-  Surfaces surfaces = test::surfaces_of(field);
+  const TensorField field = cube_field(17, linear_tensor);
   const Vector3d direction(0, 0, -1);
-  surfaces.plate = test::plate_across(direction, 1);
-  const Geometry geometry(surfaces);
-  const BendingSettings settings =
-      test::settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ is about 8.
+  const Geometry geometry = geometry_with(field, plate_across(direction, 1));
+  const BendingSettings settings = settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ is about 8.
   const Start start = make_start({0.1, -0.2, 0.3}, direction, 0);
   RayBatch batch;
   batch.add(start.position, start.direction, 8);
@@ -160,7 +153,7 @@ TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
   for (int i = 0; i < 2; ++i) {
     const double d = 1e-5;
     const auto side = [&](double sign) {
-      return test::trace_one(field, geometry, one_step, start.position + sign * d * start.across[i], direction, 8);
+      return trace_one(field, geometry, one_step, start.position + sign * d * start.across[i], direction, 8);
     };
     const Vector3d position = (side(1).position - side(-1).position) / (2 * d);
     const Vector3d turned = (side(1).direction - side(-1).direction) / (2 * d);
@@ -171,24 +164,21 @@ TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
 }
 
 TEST(RayDifferential, LengthIsThatOfTheWay) {
-  const TensorField field = test::constant_field(Eigen::Matrix3d::Zero());
-  Surfaces surfaces = test::surfaces_of(field);
+  const TensorField field = constant_field(Eigen::Matrix3d::Zero());
   const Vector3d direction = Vector3d(0.3, 0.1, -1).normalized();
-  surfaces.plate = test::plate_across(direction, 3);
   RayBatch batch;
   batch.add(-2 * direction, direction, 1);
-  trace_reference(field, Geometry(surfaces), {}, batch);
+  trace_reference(field, geometry_with(field, plate_across(direction, 3)), {}, batch);
   EXPECT_NEAR(batch.length[0], 5, 1e-9);
 
   // A circle: an antisymmetric tensor turns light at a constant rate, and the length is the angle divided by this rate.
   Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();
   turning(0, 2) = 0.5;
   turning(2, 0) = -0.5;
-  const TensorField circle = test::constant_field(turning);
+  const TensorField circle = constant_field(turning);
   RayBatch arc;
   arc.add({0, 0, 0.9}, {0, 0, -1}, 1);
-  trace_reference(circle, Geometry(test::surfaces_of(circle)), test::settings_of(BendingMethod::splitting, 1.0 / 16),
-                  arc);
+  trace_reference(circle, Geometry(surfaces_of(circle)), settings_of(BendingMethod::splitting, 1.0 / 16), arc);
   ASSERT_EQ(arc.end[0], RayEnd::missed);
   const double angle = std::acos(-arc.direction[0].z());
   EXPECT_NEAR(arc.length[0], angle / 0.5, 1e-4);

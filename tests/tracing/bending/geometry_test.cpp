@@ -54,23 +54,18 @@ TEST(Geometry, BoxAgreesWithTheAnalyticOne) {
   EXPECT_GT(hits, 1000);
 }
 
-TEST(Geometry, StaysPreciseFarFromTheOrigin) {
-  Eigen::Affine3d far = Eigen::Affine3d::Identity();
-  far.translation() = Vector3d(1e6, -1e6, 1e6);
-  const Geometry geometry(box_surfaces(far));
-  const auto hit = geometry.crossing(Surface::bounds, true, far * Vector3d(0.3, 0.2, 5), Vector3d(0, 0, -1));
-  ASSERT_TRUE(hit);
-  EXPECT_NEAR(hit->distance, 4, 1e-8);
-}
-
-TEST(Geometry, WorksInAnyUnit) {
-  for (const double unit : {1e-20, 1e-6, 1e12, 1e20}) {
-    Eigen::Affine3d scaled = Eigen::Affine3d::Identity();
-    scaled.linear() *= unit;
-    const Geometry geometry(box_surfaces(scaled));
-    const auto hit = geometry.crossing(Surface::bounds, false, scaled * Vector3d(0.3, 0.2, 0), Vector3d(0, 0, -1));
-    ASSERT_TRUE(hit) << unit;
-    EXPECT_NEAR(hit->distance / unit, 1, 1e-12);
+TEST(Geometry, IsPreciseFarFromTheOriginAndInAnyUnit) {
+  const Eigen::Affine3d far(Eigen::Translation3d(1e6, -1e6, 1e6));
+  std::vector<std::tuple<Eigen::Affine3d, double, double>> cases{{far, 1, 1e-8}};
+  for (const double unit : {1e-20, 1e-6, 1e12, 1e20})
+    cases.emplace_back(Eigen::Affine3d(Eigen::Scaling(unit)), unit, 1e-12);
+  for (const auto& [placement, unit, error] : cases) {
+    const Geometry geometry(box_surfaces(placement));
+    const auto entry = geometry.crossing(Surface::bounds, true, placement * Vector3d(0.3, 0.2, 5), {0, 0, -1});
+    const auto exit = geometry.crossing(Surface::bounds, false, placement * Vector3d(0.3, 0.2, 0), {0, 0, -1});
+    ASSERT_TRUE(entry && exit) << unit;
+    EXPECT_NEAR(entry->distance / unit, 4, error);
+    EXPECT_NEAR(exit->distance / unit, 1, error);
   }
 }
 
@@ -121,10 +116,14 @@ TEST(Geometry, ASurfaceAtTheOriginOfARayIsHit) {
   }
 }
 
+/// From the unit box to half of it.
+Eigen::Affine3d turned_half() {
+  return Eigen::AngleAxisd(0.5, Vector3d(1, 1, 0).normalized()) * Eigen::Affine3d(Eigen::Scaling(0.5));
+}
+
 TEST(Geometry, KnowsWhatIsInsideTheCut) {
   Surfaces surfaces = box_surfaces();
-  Eigen::Affine3d turned = Eigen::Affine3d::Identity();
-  turned.linear() = 0.5 * Eigen::AngleAxisd(0.5, Vector3d(1, 1, 0).normalized()).toRotationMatrix();
+  const Eigen::Affine3d turned = turned_half();
   surfaces.cut = box_mesh(unit_box(), turned);
   const Geometry geometry(std::move(surfaces));
   std::mt19937 random(2);
@@ -150,8 +149,7 @@ TEST(Geometry, KnowsWhatIsInsideTheCut) {
 /// and edges, and few others are found.
 TEST(Geometry, NoneOfManyWaysIsMissed) {
   Surfaces surfaces = box_surfaces();
-  Eigen::Affine3d turned = Eigen::Affine3d::Identity();
-  turned.linear() = 0.5 * Eigen::AngleAxisd(0.5, Vector3d(1, 1, 0).normalized()).toRotationMatrix();
+  const Eigen::Affine3d turned = turned_half();
   surfaces.cut = box_mesh(unit_box(), turned);
   surfaces.obstacles = {box_mesh({Vector3d(-0.2, -0.1, 0.1), Vector3d(0.3, 0.2, 0.25)}, turned)};
   const TriangleMesh cut = *surfaces.cut;

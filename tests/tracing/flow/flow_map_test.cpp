@@ -16,7 +16,7 @@ namespace {
 using Eigen::Vector2f;
 
 /// What `photons` single photons of the same light give, with the standard deviation of the noise of their number.
-Film histogram(const FlowBench& bench, double flexibility, std::uint64_t photons) {
+Film histogram(const LightBench& bench, double flexibility, std::uint64_t photons) {
   PhotonSettings settings;
   settings.photons = photons;
   settings.density.kind = DensityKind::histogram;
@@ -35,7 +35,7 @@ double max_near(const Film& film, int x, int y) {
 
 /// Compares the light of the map with single photons: the deviations of the pixels, in units of the noise of the
 /// photons' number and of the light that the map's tolerance may move across a pixel's edge, are those of noise.
-void expect_same_light(const FlowBench& bench, double flexibility, const char* label) {
+void expect_same_light(const LightBench& bench, double flexibility, const char* label) {
   constexpr double photons = 50000;
   const Film expected = histogram(bench, flexibility, static_cast<std::uint64_t>(photons));
   FlowSettings settings = single(flexibility);
@@ -58,7 +58,7 @@ void expect_same_light(const FlowBench& bench, double flexibility, const char* l
 }
 
 TEST(FlowMap, UndisturbedLightIsExactlyOne) {
-  const FlowBench bench = make_bench(zero, plate_at(2, 1.5, 48));  // The beam is wider than the plate.
+  const LightBench bench = make_bench(zero, plate_at(2, 1.5, 48));  // The beam is wider than the plate.
   const Caustic caustic = caustic_of(bench, map_of(bench, single(0.3)));
   for (const double value : caustic.irradiance.values) ASSERT_NEAR(value, 1, 2e-5);  // Landings are single precision.
   EXPECT_NEAR(power_of(caustic, RayEnd::plate), 1.5 * 1.5 / 4, 1e-6);
@@ -79,15 +79,11 @@ TEST(FlowMap, IsTheLightOfSinglePhotons) {
 }
 
 TEST(FlowMap, EndsAtObstaclesAndCuts) {
-  Surfaces surfaces;
-  surfaces.obstacles.push_back(box_mesh(Eigen::AlignedBox3d(Vector3d(-0.4, -0.3, -1.6), Vector3d(0.2, 0.25, -1.5)),
-                                        Eigen::Affine3d::Identity()));
-  const FlowBench shadow = make_bench(lens, plate_at(2.2, 3, 48), surfaces);
+  const LightBench shadow =
+      make_bench(lens, plate_at(2.2, 3, 48), obstacle_between({-0.4, -0.3, -1.6}, {0.2, 0.25, -1.5}));
   expect_same_light(shadow, 0.4, "an obstacle's shadow");
   EXPECT_GT(power_of(caustic_of(shadow, map_of(shadow, single(0.4))), RayEnd::obstacle), 0.003);
-  Surfaces cut;
-  cut.cut =
-      box_mesh(Eigen::AlignedBox3d(Vector3d(-0.5, -0.6, -0.7), Vector3d(0.6, 0.4, 0.8)), Eigen::Affine3d::Identity());
+  const Surfaces cut = cut_between({-0.5, -0.6, -0.7}, {0.6, 0.4, 0.8});
   expect_same_light(make_bench(lens, plate_at(2.2, 3, 48), cut), 0.4, "a cut volume");
 }
 
@@ -104,7 +100,7 @@ Matrix3d hook(const Vector3d& at) {
 TEST(FlowMap, LightThatLeavesBetweenCornersIsNotOverlooked) {
   constexpr double size = 3;
   for (const int resolution : {64, 256}) {
-    const FlowBench bench = make_bench(hook, plate_at(4, size, resolution));
+    const LightBench bench = make_bench(hook, plate_at(4, size, resolution));
     const Film light = caustic_of(bench, map_of(bench, single(0.4))).irradiance;
     const Film expected = histogram(bench, 0.4, 50000);
     const auto beside = [&](const Film& film) {  // More than 0.05 beside the undisturbed beam.
@@ -125,7 +121,7 @@ TEST(FlowMap, LightThatLeavesBetweenCornersIsNotOverlooked) {
 
 /// Landings between traced samples are those of rays of the flexibility between them.
 TEST(FlowMap, InterpolatedLandingsAreThoseOfRays) {
-  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 256));
+  const LightBench bench = make_bench(lens, plate_at(2.2, 3, 256));
   const FlowSettings settings = range(0.1, 0.6);
   const FlowMap map = map_of(bench, settings);
   EXPECT_LT(static_cast<double>(map.rays), 20.0 * static_cast<double>(map.starts.size()));  // Of 33.
@@ -161,7 +157,7 @@ Matrix3d turning(const Vector3d&) {
 }
 
 TEST(FlowMap, SideLightOfARangeIsLeftOutAtEachWavelength) {
-  const FlowBench bench = make_bench(turning, plate_at(1.2, 8, 256));
+  const LightBench bench = make_bench(turning, plate_at(1.2, 8, 256));
   FlowSettings settings = range(0, 1);
   settings.side_light = false;
   const FlowMap map = map_of(bench, settings);
@@ -181,10 +177,8 @@ TEST(FlowMap, SideLightOfARangeIsLeftOutAtEachWavelength) {
 
 /// The edge of a shadow is elsewhere at each wavelength. Between vertices it is within a tenth of a pixel.
 TEST(FlowMap, ShadowsOfARangeNeedNoFineQuads) {
-  Surfaces surfaces;
-  surfaces.obstacles.push_back(box_mesh(Eigen::AlignedBox3d(Vector3d(-0.5, -0.4, -1.6), Vector3d(0.3, 0.45, -1.5)),
-                                        Eigen::Affine3d::Identity()));
-  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 256), surfaces);
+  const LightBench bench =
+      make_bench(lens, plate_at(2.2, 3, 256), obstacle_between({-0.5, -0.4, -1.6}, {0.3, 0.45, -1.5}));
   const auto traced = [&](double finest) {
     FlowSettings settings = range(0.02, 0.1);
     settings.finest = finest;
@@ -217,11 +211,8 @@ Matrix3d folds(const Vector3d& at) {
 /// Quads are divided to the last only where some light does not land; elsewhere, folds ask for the last but one.
 TEST(FlowMap, TheLastDivisionIsForEdges) {
   const auto least = [](double finest, bool has_edges) {  // The area of a triangle away from the silhouette.
-    Surfaces surfaces;
-    if (has_edges)
-      surfaces.obstacles.push_back(box_mesh(Eigen::AlignedBox3d(Vector3d(-0.5, -0.4, -1.6), Vector3d(0.3, 0.45, -1.5)),
-                                            Eigen::Affine3d::Identity()));
-    const FlowBench bench = make_bench(folds, plate_at(2.2, 4, 512), surfaces, 65);
+    const Surfaces surfaces = has_edges ? obstacle_between({-0.5, -0.4, -1.6}, {0.3, 0.45, -1.5}) : Surfaces();
+    const LightBench bench = make_bench(folds, plate_at(2.2, 4, 256), surfaces, 65);
     FlowSettings settings = single(0.1);
     settings.finest = finest;
     const FlowMap map = map_of(bench, settings);
@@ -237,7 +228,7 @@ TEST(FlowMap, TheLastDivisionIsForEdges) {
 /// Where large quads are smooth, their light is even within a triangle, which is of first order in their size: the
 /// error falls by more than half with a quarter of the tolerance, and by more where quads are near a pixel.
 TEST(FlowMap, ConvergesWithItsTolerance) {
-  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 128));
+  const LightBench bench = make_bench(lens, plate_at(2.2, 3, 128));
   const auto light = [&](double tolerance) {
     FlowSettings settings = single(0.1);
     settings.tolerance = tolerance;
@@ -245,22 +236,14 @@ TEST(FlowMap, ConvergesWithItsTolerance) {
   };
   const std::vector<double> exact = light(0.005);
   std::vector<double> errors;
-  for (const double tolerance : {0.8, 0.2, 0.05}) {
-    const std::vector<double> values = light(tolerance);
-    double squares = 0, all = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      squares += std::pow(values[i] - exact[i], 2);
-      all += exact[i] * exact[i];
-    }
-    errors.push_back(std::sqrt(squares / all));
-  }
+  for (const double tolerance : {0.8, 0.2, 0.05}) errors.push_back(relative_distance(light(tolerance), exact));
   EXPECT_LT(errors[1], errors[0] / 2);
   EXPECT_LT(errors[2], errors[1] / 3);
   EXPECT_LT(errors[2], 0.005);
 }
 
 TEST(FlowMap, KeepsToItsNumberOfVertices) {
-  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 512));
+  const LightBench bench = make_bench(lens, plate_at(2.2, 3, 512));
   for (const std::size_t most : {1u, 100u, 3000u}) {
     FlowSettings settings = single(0.4);
     settings.max_starts = most;
@@ -273,7 +256,7 @@ TEST(FlowMap, KeepsToItsNumberOfVertices) {
 }
 
 TEST(FlowMap, BadSettingsAreRefused) {
-  const FlowBench bench = make_bench(zero, plate_at(2, 3, 8));
+  const LightBench bench = make_bench(zero, plate_at(2, 3, 8));
   std::vector<FlowSettings> wrong(4, single(0.1));
   wrong[0].flexibilities.clear();
   wrong[1].range = true;
@@ -283,7 +266,7 @@ TEST(FlowMap, BadSettingsAreRefused) {
 }
 
 TEST(FlowMap, CanBeCancelled) {
-  const FlowBench bench = make_bench(lens, plate_at(2, 3, 64));
+  const LightBench bench = make_bench(lens, plate_at(2, 3, 64));
   Progress progress;
   progress.cancelled = true;
   EXPECT_THROW(trace_flow_map(bench.field, bench.geometry, bench.beam, {}, single(0.1), progress), Cancelled);
@@ -296,8 +279,8 @@ Eigen::Matrix3d skew_lens(const Eigen::Vector3d& at) {
   return lens({1.1 * at.x() + 0.13 * at.y() + 0.07, 0.9 * at.y() - 0.21 * at.x() - 0.05, at.z()});
 }
 
-const FlowBench& bench() {
-  static const FlowBench bench = make_bench(skew_lens, plate_at(4, 2.4, 48));
+const LightBench& bench() {
+  static const LightBench bench = make_bench(skew_lens, plate_at(4, 2.4, 48));
   return bench;
 }
 
@@ -308,10 +291,8 @@ FlowMap map_with(FlowSettings settings, Job& job) {
 }
 
 Caustic light_with(const FlowMap& map, Ranks* ranks) {
-  std::vector<CausticBand> bands(3);
+  std::vector<CausticBand> bands = equal_bands(3, 0, static_cast<double>(map.wavelengths - 1));
   for (std::size_t i = 0; i < bands.size(); ++i) {
-    bands[i].width = static_cast<double>(map.wavelengths - 1) / 3;
-    bands[i].sample = (static_cast<double>(i) + 0.5) * bands[i].width;
     bands[i].channel = i;
     bands[i].color = {0.2, 0.3 * static_cast<double>(i), 1};
   }

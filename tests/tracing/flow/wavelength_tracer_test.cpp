@@ -1,13 +1,9 @@
 #include "tracing/flow/wavelength_tracer.h"
 
-#include <algorithm>
-#include <cmath>
 #include <functional>
-#include <utility>
-
-#include <gtest/gtest.h>
 
 #include "base/constants.h"
+#include "tests/names.h"
 
 namespace tensorray {
 namespace {

@@ -12,16 +12,13 @@ namespace {
 
 using Eigen::Affine2d;
 
-/// L2 distance from `exact`, the power of each pixel, as a part of its norm. The power is exact.
+/// Relative distance from `exact`, the power of each pixel. The power is exact.
 double distance(const FlowMap& map, const Plate& plate, const std::vector<double>& exact) {
   const Caustic caustic = draw_caustic(map, plate, {CausticBand{}}, {}, Progress());
   EXPECT_NEAR(power_of(caustic, RayEnd::plate), sum(exact), 1e-6);
-  double squares = 0, all = 0;
-  for (std::size_t i = 0; i < exact.size(); ++i) {
-    squares += std::pow(caustic.irradiance.values[i] * plate.pixel_area() - exact[i], 2);
-    all += exact[i] * exact[i];
-  }
-  return std::sqrt(squares / all);
+  std::vector<double> powers = caustic.irradiance.values;
+  for (double& each : powers) each *= plate.pixel_area();
+  return relative_distance(powers, exact);
 }
 
 constexpr int pixels = 64;
@@ -92,28 +89,19 @@ TEST(Caustic, CuspHasItsClosedForm) {
 }
 
 /// The light of one band between two samples, of which each vertex moves by `moves`, and that of many narrow bands.
-std::pair<Film, Film> swept_and_narrow(const std::function<Vector2d(const Vector2d&)>& moves, int bands) {
+std::pair<Film, Film> swept_and_narrow(const std::function<Vector2d(const Vector2d&)>& moves, std::size_t bands) {
   FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(5 + 20 * at.x(), 5 + 40 * at.y()); });
-  std::vector<Eigen::Vector2f> landings;
-  for (std::size_t i = 0; i < map.starts.size(); ++i)
-    landings.insert(landings.end(), {map.landings[i], map.landings[i] + moves(map.starts[i]).cast<float>()});
-  map.landings = landings;
-  map.wavelengths = 2;
-  map.ends.assign(landings.size(), RayEnd::plate);
-  CausticBand whole;
-  whole.sample = 0.5;
-  whole.width = 1;
-  std::vector<CausticBand> narrow(bands);
-  for (int i = 0; i < bands; ++i) {
-    narrow[i].sample = (i + 0.5) / bands;
-    narrow[i].weight = 1.0 / bands;
-  }
+  spread(map, 2, [&](const Vector2d& start, std::size_t sample) -> Vector2d {
+    return static_cast<double>(sample) * moves(start);
+  });
+  std::vector<CausticBand> narrow = equal_bands(bands, 0, 1);
+  for (CausticBand& band : narrow) band.width = 0;
   const auto draw = [&](const std::vector<CausticBand>& each) {
     const Caustic caustic = draw_caustic(map, unit_plate(), each, {1, true, 1}, Progress());
     EXPECT_NEAR(all_power(caustic), 1, 1e-9);
     return caustic.irradiance;
   };
-  return {draw({whole}), draw(narrow)};
+  return {draw(equal_bands(1, 0, 1)), draw(narrow)};
 }
 
 TEST(Caustic, ABandIsSweptInStepsOfAPixel) {
@@ -121,36 +109,20 @@ TEST(Caustic, ABandIsSweptInStepsOfAPixel) {
   for (std::size_t i = 0; i < swept.values.size(); ++i) ASSERT_NEAR(swept.values[i], narrow.values[i], 1e-9) << i;
   // Triangles that move by a different number of pixels still meet.
   const auto [bent, exact] = swept_and_narrow([](const Vector2d& at) { return Vector2d(14 * at.y(), 0); }, 400);
-  double squares = 0, all = 0;
-  for (std::size_t i = 0; i < bent.values.size(); ++i) {
-    squares += std::pow(bent.values[i] - exact.values[i], 2);
-    all += std::pow(exact.values[i], 2);
-  }
-  EXPECT_LT(std::sqrt(squares / all), 0.02);
+  EXPECT_LT(relative_distance(bent.values, exact.values), 0.02);
 }
 
 /// A prism: a strip of light that each wavelength moves further. The light of a column is that of a box, the strip,
 /// averaged over the way that it moves. Beyond the bands that are drawn it lands on something else, or does not.
 TEST(Caustic, ASpectrumHasItsClosedFormWhateverItsEndsMeet) {
   constexpr double left = 5, width = 5, way = 41;
-  constexpr int count = 20;
-  std::vector<CausticBand> bands(count);
-  for (int i = 0; i < count; ++i) {
-    bands[i].sample = (i + 0.5) / count;
-    bands[i].width = bands[i].weight = 1.0 / count;
-  }
   const auto integral = [](double x) { return x <= 0 ? 0 : x < width ? x * x / 2 / width : x - width / 2; };
   const auto before = [&](double x) { return (integral(x - left) - integral(x - left - way)) / way; };
   for (const RayEnd end : {RayEnd::plate, RayEnd::missed, RayEnd::obstacle}) {
     FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(left + width * at.x(), 40 * at.y()); });
-    std::vector<Eigen::Vector2f> landings;
-    for (const Eigen::Vector2f& at : map.landings)
-      for (const float x : {0.0f, 1.0f, 2.0f}) landings.emplace_back(at.x() + x * static_cast<float>(way), at.y());
-    map.landings = landings;
-    map.wavelengths = 3;
-    map.ends.assign(landings.size(), RayEnd::plate);
+    spread(map, 3, [&](const Vector2d&, std::size_t sample) { return Vector2d(static_cast<double>(sample) * way, 0); });
     for (std::size_t i = 2; i < map.ends.size(); i += 3) map.ends[i] = end;
-    const Caustic caustic = draw_caustic(map, unit_plate(), bands, {}, Progress());
+    const Caustic caustic = draw_caustic(map, unit_plate(), equal_bands(20, 0, 1), {}, Progress());
     EXPECT_NEAR(power_of(caustic, RayEnd::plate), 1, 1e-9);
     for (int x = 0; x < pixels; ++x) {
       double power = 0;
@@ -176,21 +148,19 @@ TEST(Caustic, LightBesideAShadowMakesNoDots) {
 /// A shadow whose edge is a straight line that moves with the wavelength, and light that moves with it, too. At any
 /// place among the samples, light is exactly that beside the edge, within quads of eight pixels.
 TEST(Caustic, TheEdgeOfAShadowIsExactBetweenVertices) {
-  constexpr int samples = 33;
+  constexpr std::size_t samples = 33;
   const auto edge = [](double sample, double y) { return (sample + 0.5) / (samples - 1) + y / 4; };
   for (const auto& [is_mirrored, dark] :
        {std::pair(false, RayEnd::obstacle), std::pair(true, RayEnd::obstacle), std::pair(false, RayEnd::side)}) {
     FlowMap map = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(2 + 50 * at.x(), 2 + 60 * at.y()); });
-    std::vector<Eigen::Vector2f> landings;
-    map.ends.clear();
-    for (std::size_t i = 0; i < map.starts.size(); ++i)
-      for (int k = 0; k < samples; ++k) {
-        const int sample = is_mirrored ? samples - 1 - k : k;
-        map.ends.push_back(map.starts[i].x() > edge(sample, map.starts[i].y()) ? RayEnd::plate : dark);
-        landings.push_back(map.landings[i] + Eigen::Vector2f(0.2f * static_cast<float>(sample), 0));
-      }
-    map.landings = landings;
-    map.wavelengths = samples;
+    const auto place = [&, is_mirrored = is_mirrored](std::size_t sample) {
+      return static_cast<double>(is_mirrored ? samples - 1 - sample : sample);
+    };
+    spread(map, samples, [&](const Vector2d&, std::size_t sample) { return Vector2d(0.2 * place(sample), 0); });
+    for (std::size_t i = 0; i < map.ends.size(); ++i) {
+      const Vector2d& start = map.starts[i / samples];
+      if (start.x() <= edge(place(i % samples), start.y())) map.ends[i] = dark;
+    }
     map.check_step = 8;
     for (const double sample :
          {10.2, 14.3, 15.5}) {  // The edge is between vertices that are neither lit nor dark at all.
@@ -213,14 +183,11 @@ TEST(Caustic, TheEdgeOfAShadowIsExactBetweenVertices) {
 TEST(Caustic, SeparateWavelengthsHaveSeparateShadows) {
   FlowMap alone = lattice_map(8, 0, 1, [](const Vector2d& at) { return Vector2d(2 + 60 * at.x(), 2 + 60 * at.y()); });
   FlowMap both = alone;
-  both.wavelengths = 2;
-  both.landings.clear();
-  both.ends.clear();
+  spread(both, 2, [](const Vector2d&, std::size_t) { return Vector2d(0, 0); });
   for (std::size_t i = 0; i < alone.starts.size(); ++i) {
     const double x = alone.starts[i].x();
-    if (x > 0.5) alone.ends[i] = RayEnd::obstacle;
-    both.landings.insert(both.landings.end(), 2, alone.landings[i]);
-    both.ends.insert(both.ends.end(), {alone.ends[i], x > 0.2 ? RayEnd::obstacle : RayEnd::plate});
+    if (x > 0.5) alone.ends[i] = both.ends[2 * i] = RayEnd::obstacle;
+    if (x > 0.2) both.ends[2 * i + 1] = RayEnd::obstacle;
   }
   const auto light = [](const FlowMap& map) {
     return draw_caustic(map, unit_plate(), {CausticBand{}}, {}, Progress());
@@ -230,7 +197,7 @@ TEST(Caustic, SeparateWavelengthsHaveSeparateShadows) {
 
 /// Light of a wavelength that nobody sees has power, too.
 TEST(Caustic, LightWithoutColourHasPower) {
-  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 48));
+  const LightBench bench = make_bench(lens, plate_at(2.2, 3, 48));
   const FlowMap map = map_of(bench, single(0.4));
   const Caustic caustic = draw_caustic(map, bench.plate(), {CausticBand{}}, {1, false}, Progress());
   EXPECT_EQ(sum(caustic.color.values), 0);
@@ -240,14 +207,11 @@ TEST(Caustic, LightWithoutColourHasPower) {
 
 /// The picture does not depend on whether the channels' irradiance is wanted, and is what the channels add up to.
 TEST(Caustic, ChannelsAddUpToTheColours) {
-  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 96));
+  const LightBench bench = make_bench(lens, plate_at(2.2, 3, 96));
   const FlowMap map = map_of(bench, range(0.1, 0.4));
   constexpr std::size_t channels = 6, parts = 5;
-  std::vector<CausticBand> bands(channels * parts);
+  std::vector<CausticBand> bands = equal_bands(channels * parts, 0, static_cast<double>(map.wavelengths - 1));
   for (std::size_t i = 0; i < bands.size(); ++i) {
-    const double width = static_cast<double>(map.wavelengths - 1) / static_cast<double>(bands.size());
-    bands[i].sample = (static_cast<double>(i) + 0.5) * width;
-    bands[i].width = width;
     bands[i].channel = i / parts;
     bands[i].weight = 1.0 / parts;
     bands[i].color = Eigen::Vector3d(1, 0.5, -0.1) * static_cast<double>(1 + i / parts) / parts;
@@ -271,14 +235,9 @@ TEST(Caustic, ChannelsAddUpToTheColours) {
 /// picture would change by much more.
 TEST(Caustic, ChangesByLittleIfLandingsDo) {
   constexpr float change = 0.0025f;  // Pixels.
-  const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 96));
+  const LightBench bench = make_bench(lens, plate_at(2.2, 3, 96));
   FlowMap map = map_of(bench, range(0.1, 0.4));
-  std::vector<CausticBand> bands(128);
-  for (std::size_t i = 0; i < bands.size(); ++i) {
-    bands[i].width = static_cast<double>(map.wavelengths - 1) / static_cast<double>(bands.size());
-    bands[i].sample = (static_cast<double>(i) + 0.5) * bands[i].width;
-    bands[i].weight = 1.0 / static_cast<double>(bands.size());
-  }
+  const std::vector<CausticBand> bands = equal_bands(128, 0, static_cast<double>(map.wavelengths - 1));
   const Film before = caustic_of(bench, map, bands).irradiance;
   const std::size_t half = (map.wavelengths - 1) / 2;
   for (std::size_t i = 0; i < map.landings.size(); ++i) {
@@ -295,15 +254,9 @@ TEST(Caustic, ChangesByLittleIfLandingsDo) {
 
 TEST(Caustic, LightThatMovesFarHasManyBands) {
   FlowMap map = lattice_map(2, 0, 1, [](const Vector2d& at) { return at; });
-  map.wavelengths = 2;
-  std::vector<Eigen::Vector2f> landings;
-  for (const Eigen::Vector2f& at : map.landings) landings.insert(landings.end(), {at, at + Eigen::Vector2f(21, 0)});
-  map.landings = landings;
-  map.ends.assign(landings.size(), RayEnd::plate);
-  EXPECT_EQ(band_count(map, 1), 21);
-  EXPECT_EQ(band_count(map, 4), 24);
-  EXPECT_EQ(band_count(map, 32), 32);
-  EXPECT_EQ(band_count(map, 1000), 1000);
+  spread(map, 2, [](const Vector2d&, std::size_t sample) { return Vector2d(sample == 0 ? 0 : 21, 0); });
+  for (const auto& [channels, bands] : {std::pair(1, 21), {4, 24}, {32, 32}, {1000, 1000}})
+    EXPECT_EQ(band_count(map, channels), bands);
   for (std::size_t i = 1; i < map.landings.size(); i += 2) map.landings[i].x() += 1000;
   EXPECT_EQ(band_count(map, 4), 128);
 }
@@ -425,20 +378,16 @@ TEST(FlowView, ShowsTheNearestOfItsSheets) {
 
 /// A view of a range draws each of its wavelengths as a view of this wavelength alone does.
 TEST(FlowView, DrawsAnyWavelengthOfARange) {
-  FlowMap map = lattice([](const Vector2d& at) -> Vector2d { return Vector2d(30, 40) + 20 * at; }, 8);
+  FlowMap range = lattice([](const Vector2d& at) -> Vector2d { return Vector2d(30, 40) + 20 * at; }, 8);
   constexpr std::size_t samples = 5;
-  FlowMap range = map;
-  range.wavelengths = samples;
+  spread(range, samples, [](const Vector2d&, std::size_t sample) {
+    const auto way = static_cast<double>(sample * sample);  // Light turns back in y.
+    return Vector2d(4 * way, 8 * std::abs(way - 6));
+  });
   range.check_step = samples - 1;
-  range.landings.clear();
-  range.ends.clear();
-  range.lengths.assign(map.starts.size() * 2, 3.0f);
-  for (std::size_t i = 0; i < map.starts.size(); ++i)
-    for (std::size_t sample = 0; sample < samples; ++sample) {
-      const auto way = static_cast<float>(sample * sample);  // Light turns back in y.
-      range.landings.emplace_back(map.landings[i] + Eigen::Vector2f(4 * way, 8 * std::abs(way - 6)));
-      range.ends.push_back((i + sample) % 13 == 0 ? RayEnd::missed : RayEnd::plate);
-    }
+  range.lengths.assign(range.starts.size() * 2, 3.0f);
+  for (std::size_t i = 0; i < range.ends.size(); ++i)
+    if ((i / samples + i % samples) % 13 == 0) range.ends[i] = RayEnd::missed;
   for (std::size_t t = 0; t < range.triangles.size(); t += 7) range.triangles[t].is_torn = true;
   for (const double place : {0.75, 1.0, 1.4, 1.5, 2.0, 2.2, 3.5}) {
     const std::vector<FlowPoint> one = draw(range, landings_of(96), 2, {place, place}, place),

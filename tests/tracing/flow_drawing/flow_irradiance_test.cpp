@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "renderer/light_maps/photon_map.h"
+#include "renderer/lights/lights.h"
 #include "tests/tracing/support.h"
 
 namespace tensorray {
@@ -118,6 +119,10 @@ Plate plane_behind(const Vector3d& direction) {
   return plate;
 }
 
+TriangleMesh square_at(const Vector3d& center, double size) {
+  return rectangle_mesh(center, Vector3d::UnitX(), Vector3d::UnitY(), {size, size});
+}
+
 std::optional<FlowIrradiance> land_on(const TriangleMesh& body, const TensorField& field, const LandingLight& light) {
   Surfaces surfaces = surfaces_of(field);
   surfaces.body = body;
@@ -179,16 +184,9 @@ TEST(FlowIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
 
 TEST(FlowIrradianceTest, OnlyTheFirstLayerOfABodyHasLight) {
   const TensorField field = constant_field(Matrix3d::Zero());
-  const auto square = [](double x, double z, std::uint32_t first, TriangleMesh& mesh) {
-    for (const auto& [a, b] : {std::pair{-0.25, -0.25}, {0.25, -0.25}, {0.25, 0.25}, {-0.25, 0.25}})
-      mesh.vertices.emplace_back(x + a, b, z);
-    mesh.triangles.push_back({first, first + 1, first + 2});
-    mesh.triangles.push_back({first, first + 2, first + 3});
-  };
-  TriangleMesh body;  // The second square is below the first, half of the third is.
-  square(0, -2, 0, body);
-  square(0, -2.5, 4, body);
-  square(0.25, -2.25, 8, body);
+  // The second square is below the first, half of the third is.
+  const TriangleMesh body =
+      joined({square_at({0, 0, -2}, 0.5), square_at({0, 0, -2.5}, 0.5), square_at({0.25, 0, -2.25}, 0.5)});
   const auto landed = land_on(body, field, sun({0, 0, -1}));
   ASSERT_TRUE(landed);
   EXPECT_NEAR(irradiance_at(*landed, 0, {0, 0, 0}), 1, 2e-3);
@@ -198,11 +196,8 @@ TEST(FlowIrradianceTest, OnlyTheFirstLayerOfABodyHasLight) {
 
 TEST(FlowIrradianceTest, LightThatMeetsABodyBeforeTheVolumeIsNotCounted) {
   const TensorField field = constant_field(Matrix3d::Zero());
-  TriangleMesh body;  // Above the left half of the volume, and below its right half.
-  for (const double x : {-1.0, 0.0})
-    for (const auto& [a, b] : {std::pair{0.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {0.0, 1.0}})
-      body.vertices.emplace_back(x + a, b, x < 0 ? 1.5 : -1.5);
-  body.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+  // Above the left half of the volume, and below its right half.
+  const TriangleMesh body = joined({square_at({-1, 0, 1.5}, 2), square_at({1, 0, -1.5}, 2)});
   const auto landed = land_on(body, field, sun({0, 0, -1}));
   ASSERT_TRUE(landed);
   EXPECT_EQ(irradiance_at(*landed, 0, {-0.5, 0, 0}), 0);

@@ -17,15 +17,17 @@ using PacketKernel = EveryInstructionSet;
 INSTANTIATE_TEST_SUITE_P(All, PacketKernel, test::instruction_sets(), instruction_set_name);
 
 Scene random_scene(const Lattice& lattice, double step, double kick, int bundles) {
-  TensorField field = lattice_field(odd_box(), lattice, smooth_tensor(41));
+  static const TensorGrid once = lattice_grid(odd_box(), lattices()[0], smooth_tensor(41));
+  TensorField field = placed(once, lattice);
   RayBatch rays = random_rays(field, bundles, wavelengths(kick), 42);
   const std::string name = lattice.name + ", step " + std::to_string(step) + ", kick " + std::to_string(kick);
   return make_scene(name, std::move(field), {}, step, std::move(rays));
 }
 
 TEST_P(PacketKernel, KeepsToAThousandthOfAVoxelOnLongWays) {
+  static const TensorGrid once = lattice_grid(index_box({-7, 3, -100}, {60, 62, 261}), lattices()[0], smooth_tensor(3));
   for (const Lattice& lattice : tested_lattices()) {
-    TensorField field = lattice_field(index_box({-7, 3, -100}, {60, 62, 261}), lattice, smooth_tensor(3));
+    TensorField field = placed(once, lattice);
     Numbers numbers(4);
     RayBatch rays;
     for (int i = 0; i < 10; ++i) {

@@ -76,8 +76,7 @@ TEST(Paths, RecordsTheStepsOfTheReference) {
   const TensorField field = cube_field(33, linear_tensor);
   Surfaces surfaces = surfaces_of(field);
   surfaces.plate = plate_across({0, 0, -1}, 1.5);
-  surfaces.obstacles.push_back(
-      box_mesh(Eigen::AlignedBox3d(Vector3d(0.3, -1, -0.6), Vector3d(1, 1, -0.2)), Eigen::Affine3d::Identity()));
+  surfaces.obstacles.push_back(box_between({0.3, -1, -0.6}, {1, 1, -0.2}));
   const Geometry geometry(std::move(surfaces));
   RayBatch batch;
   for (int i = 0; i < 40; ++i) batch.add({0.05 * i - 1, 0.3, i % 4 == 0 ? 0.2 : 2.0}, {0, 0, -1}, 0.02 * i);
@@ -198,12 +197,7 @@ TEST(Paths, ACutLeavesAStraightPieceWithin) {
   const TensorField field = constant_field(general_tensor());
   Surfaces surfaces = surfaces_of(field);
   // Two boxes, so that light leaves one and enters the other.
-  TriangleMesh cut = box_mesh({Vector3d(-2, -2, 0.4), Vector3d(2, 2, 0.8)}, Eigen::Affine3d::Identity());
-  const TriangleMesh lower = box_mesh({Vector3d(-2, -2, -0.8), Vector3d(2, 2, -0.4)}, Eigen::Affine3d::Identity());
-  const auto offset = static_cast<std::uint32_t>(cut.vertices.size());
-  cut.vertices.insert(cut.vertices.end(), lower.vertices.begin(), lower.vertices.end());
-  for (const auto& t : lower.triangles) cut.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
-  surfaces.cut = cut;
+  surfaces.cut = joined({box_between({-2, -2, 0.4}, {2, 2, 0.8}), box_between({-2, -2, -0.8}, {2, 2, -0.4})});
   const Path path = trace_one_path(field, surfaces, {}, seed_at({0, 0, 2}, 0.1), {});
   ASSERT_GT(path.points.size(), 5u);
   EXPECT_NEAR(path.points.front().position.z(), 0.8, 1e-9);

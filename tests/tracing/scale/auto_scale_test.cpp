@@ -77,7 +77,7 @@ TEST(AutoScale, LightThatOnlyTurnsTurnsVisibly) {
 
 TEST(AutoDirection, IsTheOneThatShowsMost) {
   for (int axis = 0; axis < 3; ++axis) {
-    const TensorField field = cube_field(17, [&](const Vector3d& p) {
+    const TensorField field = cube_field(9, [&](const Vector3d& p) {
       Matrix3d T = Matrix3d::Zero();  // Bends light along one axis only.
       T((axis + 1) % 3, axis) = std::sin(3 * p[(axis + 1) % 3]);
       return T;

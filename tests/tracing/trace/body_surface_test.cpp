@@ -55,13 +55,9 @@ std::vector<Body> bodies() {
            box_mesh({-on_voxels, on_voxels}, Eigen::Affine3d::Identity())}};
 }
 
-struct BeamStart {
-  Vector3d position, direction;
-};
-
 /// Light from below over the whole body, a bit oblique.
-std::vector<BeamStart> beam() {
-  std::vector<BeamStart> starts;
+std::vector<Ray> beam() {
+  std::vector<Ray> starts;
   const Vector3d V = Vector3d(0.13, -0.07, 1).normalized();
   for (int i = -9; i <= 9; ++i)
     for (int j = -9; j <= 9; ++j)
@@ -69,26 +65,15 @@ std::vector<BeamStart> beam() {
   return starts;
 }
 
-/// One step of the classical Runge–Kutta method for P' = V, V' = s (T V − (VᵀTV) V).
-Ray stepped(const TensorFunction& T, const Ray& ray, double h) {
-  const auto bend = [&](const Vector3d& at, const Vector3d& v) {
-    const Vector3d Tv = T(at) * v;
-    return Vector3d(body_flexibility * (Tv - v.dot(Tv) / v.squaredNorm() * v));
-  };
-  const Vector3d &P = ray.position, &V = ray.direction;
-  const Vector3d k1 = bend(P, V), v2 = V + h / 2 * k1, k2 = bend(P + h / 2 * V, v2), v3 = V + h / 2 * k2,
-                 k3 = bend(P + h / 2 * v2, v3), v4 = V + h * k3, k4 = bend(P + h * v3, v4);
-  return {P + h / 6 * (V + 2 * v2 + 2 * v3 + v4), (V + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)).normalized()};
-}
-
 /// Where a ray lands on the plate; `grazes` gets whether it meets the surface, or an edge of it, at a small angle:
 /// there the way depends on less than a mesh has.
-Ray true_ray(const Body& body, const TensorFunction& T, const BeamStart& start, bool& grazes) {
-  constexpr double h = 1e-3;
-  Ray ray{start.position, start.direction};
+Ray true_ray(const Body& body, const TensorFunction& T, const Ray& start, bool& grazes) {
+  constexpr double h = 2e-3;
+  Ray ray = start;
   bool inside = false;
   const auto step = [&](double length) {
-    return inside ? stepped(T, ray, length) : Ray{ray.position + length * ray.direction, ray.direction};
+    return inside ? stepped(T, body_flexibility, ray, length)
+                  : Ray{ray.position + length * ray.direction, ray.direction};
   };
   grazes = false;
   while (ray.position.z() < plate_height && ray.direction.z() > 0.2) {
@@ -133,11 +118,11 @@ TensorField body_field(const Body& body, const TensorFunction& T, int voxels, co
 }
 
 struct Truth {
-  std::vector<BeamStart> starts;
+  std::vector<Ray> starts;
   std::vector<Vector3d> landings;
 
   Truth(const Body& body, const TensorFunction& T) {
-    for (const BeamStart& start : beam()) {
+    for (const Ray& start : beam()) {
       bool grazes = false;
       const Ray ray = true_ray(body, T, start, grazes);
       if (grazes) continue;
@@ -156,7 +141,7 @@ double landing_error(const TensorField& field, const Truth& truth) {
   BendingSettings settings;
   settings.tolerance = 1e-4;
   RayBatch batch;
-  for (const BeamStart& start : truth.starts) batch.add(start.position, start.direction, body_flexibility);
+  for (const Ray& start : truth.starts) batch.add(start.position, start.direction, body_flexibility);
   trace(field, geometry, settings, batch);
   double greatest = 0;
   for (std::size_t i = 0; i < truth.starts.size(); ++i) {
@@ -167,19 +152,16 @@ double landing_error(const TensorField& field, const Truth& truth) {
 }
 
 TEST(BodySurface, LandingsAreExactWhateverThePhaseOfTheVoxels) {
-  const std::vector<std::pair<std::string, TensorFunction>> tensors{
-      {"constant", [](const Vector3d&) { return general_tensor(); }}, {"linear", linear_tensor}};
-  for (const Body& body : bodies())
-    for (const auto& [name, T] : tensors) {
-      const Truth truth(body, T);
-      EXPECT_GT(truth.starts.size(), 150u);
-      for (const double phase : {0.0, 0.27, 0.5, 0.81})
-        for (const Interpolation between : {Interpolation::cubic, Interpolation::linear}) {
-          const TensorField field = body_field(body, T, 32, phase * Vector3d(1, -0.7, 1.3), between);
-          EXPECT_LT(landing_error(field, truth), 0.01)
-              << body.name << ", " << name << ", phase " << phase << ", " << static_cast<int>(between);
-        }
-    }
+  for (const Body& body : bodies()) {
+    const Truth truth(body, linear_tensor);
+    EXPECT_GT(truth.starts.size(), 150u);
+    for (const double phase : {0.0, 0.27, 0.5, 0.81})
+      for (const Interpolation between : {Interpolation::cubic, Interpolation::linear}) {
+        const TensorField field = body_field(body, linear_tensor, 32, phase * Vector3d(1, -0.7, 1.3), between);
+        EXPECT_LT(landing_error(field, truth), 0.01)
+            << body.name << ", phase " << phase << ", " << static_cast<int>(between);
+      }
+  }
 }
 
 /// Of a field that is not linear: half the voxels, a quarter of the error in the world, half of it in voxels.

@@ -1,7 +1,5 @@
 // Rays in cubic fields, against rays through the formula that the voxels were sampled from.
 
-#include <functional>
-
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "tests/tracing/support.h"
@@ -31,12 +29,8 @@ Matrix3d cubic_polynomial(const Vector3d& p) {
   return T;
 }
 
-struct Start {
-  Vector3d position, direction;
-};
-
-std::vector<Start> starts() {
-  std::vector<Start> result;
+std::vector<Ray> starts() {
+  std::vector<Ray> result;
   for (int i = 0; i < 6; ++i)
     result.push_back({Vector3d(-0.4 + 0.15 * i, 0.3 - 0.13 * i, -0.6), Vector3d(0.1 * i - 0.3, 0.1, 1).normalized()});
   return result;
@@ -54,7 +48,7 @@ BendingSettings settings_for(BendingMethod method, double step) {
 double distance(const TensorField& field, const BendingSettings& settings, const std::vector<Ray>& truth) {
   const Geometry geometry(surfaces_of(field));
   double greatest = 0;
-  const std::vector<Start> from = starts();
+  const std::vector<Ray> from = starts();
   for (std::size_t i = 0; i < from.size(); ++i) {
     const Ray ray = trace_one(field, geometry, settings, from[i].position, from[i].direction, flexibility);
     const Vector3d apart = ray.position + ray.direction - truth[i].position - truth[i].direction;
@@ -63,14 +57,14 @@ double distance(const TensorField& field, const BendingSettings& settings, const
   return greatest;
 }
 
-std::vector<Ray> true_rays(const std::function<Matrix3d(const Vector3d&)>& T) {
+std::vector<Ray> true_rays(const TensorFunction& T) {
   std::vector<Ray> rays;
-  for (const Start& start : starts())
+  for (const Ray& start : starts())
     rays.push_back(through_formula(T, flexibility, start.position, start.direction, way));
   return rays;
 }
 
-TensorField field_of(const std::function<Matrix3d(const Vector3d&)>& T, int voxels, const Interpolant& interpolant) {
+TensorField field_of(const TensorFunction& T, int voxels, const Interpolant& interpolant) {
   return TensorField(cube_grid(Eigen::Vector3i::Constant(voxels), T), interpolant);
 }
 
@@ -103,7 +97,7 @@ TEST(CubicRays, TheErrorFollowsTheTolerance) {
   const TensorField field = field_of(formula, 33, cubic);
   const double voxel = voxel_size(field);
   std::vector<Ray> truth;
-  for (const Start& start : starts())
+  for (const Ray& start : starts())
     truth.push_back(trace_one(field, Geometry(surfaces_of(field)), settings_for(BendingMethod::splitting4, 0.1),
                               start.position, start.direction, flexibility));
   double last = 1;

@@ -1,11 +1,8 @@
 // Rays through fields of several levels: against level 0 alone, against rays through the formula that the voxels were
 // sampled from, and packets against the reference.
 
-#include <cmath>
 #include <limits>
 #include <map>
-
-#include <gtest/gtest.h>
 
 #include "tests/tracing/packet_support.h"
 #include "tracing/paths/paths.h"
@@ -14,13 +11,6 @@
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using Eigen::AlignedBox3d;
-using Eigen::AlignedBox3i;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3i;
 
 /// Chooses bricks by their middle, in voxels of level 0.
 using Place = std::function<bool(const Vector3d&)>;
@@ -71,7 +61,14 @@ TensorGrid waves_grid(const AlignedBox3i& box, const Lattice& lattice, int level
 }
 
 AlignedBox3i usual_box() { return index_box({0, 0, 0}, {33, 33, 33}); }
-TensorField waves_field(const Lattice& lattice) { return cubic_field(waves_grid(usual_box(), lattice, 3)); }
+
+/// Of three levels in the usual box, in cubic voxels.
+const TensorGrid& usual_grid() {
+  static const TensorGrid grid = waves_grid(usual_box(), lattices()[0], 3);
+  return grid;
+}
+
+TensorField waves_field(const Lattice& lattice) { return placed(usual_grid(), lattice); }
 
 std::vector<Lattice> two_lattices() { return {lattices().front(), lattices().back()}; }
 
@@ -164,7 +161,7 @@ TEST_P(RaysThroughLevels, DifferentialsAreThoseOfTheReference) {
 /// Light reaches no end in fields that cannot be followed, but it stops.
 TEST_P(RaysThroughLevels, NothingHangs) {
   for (const double value : {std::nan(""), std::numeric_limits<double>::infinity(), 1e30}) {
-    TensorGrid grid = waves_grid(usual_box(), lattices()[0], 3);
+    TensorGrid grid = usual_grid();
     grid.finer[0][20].values[100](1, 2) = static_cast<float>(value);
     TensorField field = cubic_field(grid);
     RayBatch rays = rays_of_all_kinds(field, {0.05, 1e30, std::nan("")});
