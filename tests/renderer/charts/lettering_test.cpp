@@ -71,7 +71,6 @@ TEST(LetteringTest, InkIsWithinTheLine) {
     }
 }
 
-/// The position of each character is the width of the text before it.
 TEST(LetteringTest, TextIsItsCharactersSideBySide) {
   const std::string text = "Ag 1e-3";
   const double height = 24.5;

@@ -203,7 +203,7 @@ TEST(ReadMeshTest, PolygonsHaveTheirArea) {
 
 TEST(ReadMeshTest, PolygonsThatCrossThemselvesAreDivided) {
   Polygon star;  // Its corners are on a circle, in an order that has no ear.
-  constexpr int count = 9999, step = 4999;
+  constexpr int count = 5999, step = 2999;
   for (int i = 0; i < count; ++i) {
     const double angle = 2 * pi * static_cast<double>(i * static_cast<long>(step) % count) / count;
     star.corners.emplace_back(std::cos(angle) + 1e-3 * (i % 7), std::sin(angle), 0);
@@ -215,7 +215,7 @@ TEST(ReadMeshTest, PolygonsThatCrossThemselvesAreDivided) {
 /// Most of its corners are no ear, and each ear that is cut makes only its neighbours one.
 TEST(ReadMeshTest, PolygonsWithManyConcaveCornersAreDivided) {
   Polygon crescent;
-  constexpr int count = 4999;
+  constexpr int count = 2999;
   const auto add = [&](double radius, double centre, double angle) {
     crescent.corners.emplace_back(centre + radius * std::cos(angle), radius * std::sin(angle), 0);
   };

@@ -88,7 +88,6 @@ TEST(CircleAt, IsCosineAndSine) {
   }
 }
 
-/// One number chooses with the given probability, and what is left of it is uniform after either choice.
 TEST(Choose, LeavesAnEvenNumber) {
   constexpr int count = 60000;
   for (const double share : {0.0, 1e-3, 0.3, 1.0}) {

@@ -12,8 +12,6 @@
 namespace tensorray {
 namespace {
 
-using Channels = std::vector<std::string>;
-
 /// A light whose only channel is its only band.
 EnvironmentLight grey(int width, int height) {
   EnvironmentLight light;
@@ -98,22 +96,20 @@ TEST(EnvironmentMap, ChannelsHaveSpectra) {
   EXPECT_NEAR(map.importance(), 4 * pi * 24.25, 1e-5);
 }
 
-TEST(EnvironmentMap, DensityIntegratesToOne) {
-  const EnvironmentMap map(uneven_sky(), {1});
-  // The density jumps at the edges of texels. There the midpoint rule is off by up to one row of its cells.
-  EXPECT_NEAR(integrate([&](const Vector3d& d) { return map.pdf(d); }, 1000), 1, 2e-3);
-}
-
 TEST(EnvironmentMap, SamplesFollowTheDensity) {
-  const EnvironmentLight light = uneven_sky();
-  const EnvironmentMap map(light, {1});
+  const EnvironmentMap map(uneven_sky(), {1});
   constexpr int rows = 12, columns = 24;  // Bins that differ from the texels and have equal solid angles.
   std::vector<double> weights(rows * columns);
   const auto bin = [](const Vector3d& d) {
     const int y = std::min(static_cast<int>((1 - d.z()) / 2 * rows), rows - 1);
     return y * columns + std::min(static_cast<int>((std::atan2(d.y(), d.x()) / (2 * pi) + 0.5) * columns), columns - 1);
   };
-  integrate([&](const Vector3d& d) { return weights[bin(d)] += map.pdf(d); }, 1200);
+  // The density jumps at the edges of texels. There the midpoint rule is off by up to one row of its cells.
+  const auto density = [&](const Vector3d& d) {
+    weights[bin(d)] += map.pdf(d);
+    return map.pdf(d);
+  };
+  EXPECT_NEAR(integrate(density, 1200), 1, 2e-3);
   std::vector<int> counts(rows * columns);
   for (int i = 0; i < 50000; ++i) {
     const Vector3d d = map.sample({random_uniform(2, i, 0), random_uniform(2, i, 1)});

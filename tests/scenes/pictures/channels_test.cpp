@@ -1,6 +1,5 @@
 #include <regex>
 
-#include "integrators/methods/read_scene.h"
 #include "scenes/outputs/channel_table.h"
 #include "tests/data_folder.h"
 #include "tests/scenes/pictures/pictures.h"

@@ -1,11 +1,7 @@
 // The method polariscope: polarised light through a field, between polarisers.
 
-#include <cmath>
-
-#include <Eigen/Core>
 #include <Eigen/LU>
 #include <fmt/format.h>
-#include <gmock/gmock.h>
 
 #include "base/constants.h"
 #include "scenes/outputs/picture_outputs.h"
@@ -14,10 +10,6 @@
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using ::testing::Contains;
-using ::testing::HasSubstr;
 
 /// A plate 0.01 thick with a stress of 8e6 along x: 4.4 µm of retardance with C = 55e-12.
 constexpr const char* plate_scene = R"({
@@ -217,7 +209,6 @@ TEST_F(Polariscope, TheAnalyserTurnsWithoutTracingAgain) {
     EXPECT_EQ(render_with({setting}, kept), render_with({setting}, nullptr)) << setting;
 }
 
-/// Compressive and tensile stress are not the same: eigenvalues stay as they are.
 TEST_F(Polariscope, SignsOfStressesCount) {
   const std::string tensor = "field.generate.tensor=[[4e6,0,0],[0,-4e6,0],[0,0,0]]";
   const Image image = render({tensor});
@@ -228,7 +219,6 @@ TEST_F(Polariscope, SignsOfStressesCount) {
   EXPECT_THAT(notes_, Contains(HasSubstr("/field/scale")));
 }
 
-/// Keys without an effect are named.
 TEST_F(Polariscope, SaysWhichKeysHaveNoEffect) {
   const std::vector<std::pair<Settings, std::string>> cases{
       {{R"(integrator.arrangement={"before":[{"polarizer":0}]})", "integrator.analyzer=10"}, "`/integrator/analyzer`"},
