@@ -14,42 +14,12 @@ TEST_F(Program, WritesPictureAndExrBesideTheScene) {
   EXPECT_EQ(files(), (std::vector<std::string>{"scene.exr", "scene.json", "scene.png"}));
   EXPECT_NE(outcome.out.find("scene.png"), std::string::npos);
   EXPECT_NE(outcome.error.find("scale"), std::string::npos);  // The program reports what "auto" chose.
+  EXPECT_THAT(run_well({"render", "scene.json", "--set", "bending.a=0.5"}).error, HasSubstr("warning: "));
   const Image exr = read_image(in_folder("scene.exr"));
   EXPECT_EQ(exr.width, 32);
   EXPECT_EQ(exr.channels, (std::vector<std::string>{"R", "G", "B"}));
   const Outcome quiet = run_well({"render", "scene.json", "--quiet"});
   EXPECT_EQ(quiet.out + quiet.error, "");
-}
-
-/// Of all options, these change the bytes in no way, or in all that is drawn at random.
-TEST_F(Program, ThreadsDoNotChangeTheFilesAndTheSeedDoes) {
-  write("scene.json", small_scene());
-  for (const std::string change : {"light.pattern=stratified", "light.pattern=sobol", "light.pattern=random",
-                                   "light.pattern=grid", R"(integrator={"type":"lens","mode":"scatter"})"}) {
-    const auto bytes = [&](const char* threads, const char* seed) {
-      Arguments arguments{"render",
-                          "scene.json",
-                          "-q",
-                          "--threads",
-                          threads,
-                          "--seed",
-                          seed,
-                          "--set",
-                          change,
-                          "--set",
-                          "light.wavelengths.per_photon=1"};
-      std::vector<std::string> endings{"exr", "png", "spectral.exr"};
-      if (change[0] == 'l') endings.insert(endings.end(), {"vtp", "fluence.vdb"});
-      for (const std::string& ending : endings) arguments.insert(arguments.end(), {"-o", "out." + ending});
-      run_well(arguments);
-      std::string all;
-      for (const std::string& ending : endings) all += read_file(in_folder("out." + ending));
-      return all;
-    };
-    const std::string one = bytes("1", "5");
-    EXPECT_TRUE(bytes("7", "5") == one) << change;
-    EXPECT_TRUE(bytes("7", "6") != one || change == "light.pattern=grid" || change[0] == 'i') << change;
-  }
 }
 
 TEST_F(Program, ProvenanceIsInTheHeader) {

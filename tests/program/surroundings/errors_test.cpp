@@ -108,30 +108,6 @@ TEST_F(Errors, Meshes) {
       expect_error(1, name, {"render", "scene.json", "-q", "--set", "obstacles=[{\"file\": \"" + name + "\"}]"});
 }
 
-TEST_F(Errors, OddLightIsWarnedOf) {
-  write("scene.json", small_scene());
-  const auto expect_warning = [&](const std::string& pattern, const std::string& set) {
-    const Outcome outcome = run_well({"render", "scene.json", "--set", set});
-    EXPECT_TRUE(std::regex_search(outcome.error, std::regex(pattern))) << outcome.error;
-  };
-  expect_warning("warning.*negative", "bending.a=0.5");
-  expect_warning("warning: [0-9]+% of the rays.*max_steps", "bending.max_steps=1");
-  expect_warning("warning: light turns too little to be seen: `field.scale` .* shows", "field.scale=1e-6");
-  expect_warning("warning: light is tangled: `field.scale` .* shows", "field.scale=3e4");
-  expect_warning("negative: light bends the other way", "field.scale=-1");
-  for (const char* set : {"bending={\"a\":0,\"b\":0}", "bending.rgb=[0.1,0,0.3]"})
-    EXPECT_EQ(run_well({"render", "scene.json", "--set", "field.scale=1e-6", "--set", set}).error.find("inf"),
-              std::string::npos)
-        << set;
-  expect_warning("warning: the plate lies before the volume", "receiver={\"center\":[0,0,9],\"size\":[1,1]}");
-  expect_warning("warning: the plate lies in the volume", "receiver={\"center\":[0,0,-0.5],\"size\":[1,1]}");
-  const Outcome beside = run_well({"render", "scene.json", "--set", "light.beam=volume", "--set",
-                                   "receiver={\"center\":[900,0,-3],\"size\":[1,1]}"});
-  EXPECT_NE(beside.error.find("warning: no light reached the plate"), std::string::npos) << beside.error;
-  expect_warning("warning: no probe ray is turned",
-                 "field.generate={\"kind\":\"constant\",\"tensor\":[[1,0,0],[0,1,0],[0,0,1]]}");
-}
-
 TEST_F(Errors, OutputsThatCannotBeWritten) {
   write("scene.json", small_scene());
   write("occupied", "");

@@ -84,7 +84,6 @@ TEST_F(RanksProgram, GiveTheFilesOfOneProcess) {
       {plate_scene(gaussian_photons), {"exr"}, 1},  // This one does not load MPI.
       {plate_under_paths("gaussian"), {"exr", "vtp", "ply"}, 2},
       {plate_scene(R"({"type": "photon_distribution"})"), {"png", "exr", "spectral.exr", "vtp", "fluence.vdb"}, 3},
-      {plate_scene(gaussian_photons, 200000), {"exr", "fluence.vdb"}, 3},  // Several chunks.
       {plate_scene(lens), {"png", "exr", "spectral.exr"}, 2},
       {plate_scene(stretch), {"exr", "vdb"}, 2},
       {plate_scene(polariscope), {"exr", "spectral.exr"}, 2},

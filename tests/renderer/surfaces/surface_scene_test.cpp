@@ -291,27 +291,24 @@ TEST(SurfaceSceneTest, RaysMayStartAnywhere) {
 }
 
 TEST(SurfaceSceneTest, BadSurfacesAreNamed) {
-  const ShadedSurface good = surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}));
-  const auto error = [&](const ShadedSurface& bad) { return message([&] { SurfaceScene({good, bad}); }); };
-  ShadedSurface bad = good;
-  bad.forces = {1, 2};
-  EXPECT_EQ(error(bad), "surface 1: there must be no forces, or a finite one for each point");
-  bad = good;
-  std::get<TriangleMesh>(bad.shape).triangles.push_back({0, 1, 4});
-  EXPECT_EQ(error(bad), "surface 1: a triangle has a corner that is none of the vertices");
-  bad = good;
-  std::get<TriangleMesh>(bad.shape).vertices[0].x() = std::nan("");
-  EXPECT_EQ(error(bad), "surface 1: a vertex is not finite in single precision");
-  std::get<TriangleMesh>(bad.shape).vertices[0].x() = 1e39;
-  EXPECT_EQ(error(bad), "surface 1: a vertex is not finite in single precision");
-  bad = good;
-  bad.path_ends = {1};
-  EXPECT_EQ(error(bad), "surface 1: path_ends must ascend to the number of triangles");
-  bad = curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, -0.1f});
-  EXPECT_EQ(error(bad), "surface 1: a radius is not a finite value >= 0");
-  bad = curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, 0.1f});
-  std::get<RoundCurves>(bad.shape).strand_ends = {3};
-  EXPECT_EQ(error(bad), "surface 1: strand_ends must ascend to the number of points");
+  const ShadedSurface square = surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}));
+  ShadedSurface forces = square, index = square, paths = square, strands = curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, 0.1f});
+  forces.forces = {1, 2};
+  std::get<TriangleMesh>(index.shape).triangles.push_back({0, 1, 4});
+  paths.path_ends = {1};
+  std::get<RoundCurves>(strands.shape).strand_ends = {3};
+  std::vector<std::pair<ShadedSurface, std::string>> bad{
+      {forces, "there must be no forces, or a finite one for each point"},
+      {index, "a triangle has a corner that is none of the vertices"},
+      {paths, "path_ends must ascend to the number of triangles"},
+      {curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, -0.1f}), "a radius is not a finite value >= 0"},
+      {strands, "strand_ends must ascend to the number of points"}};
+  for (const double far : {std::nan(""), 1e39}) {
+    bad.emplace_back(square, "a vertex is not finite in single precision");
+    std::get<TriangleMesh>(bad.back().first.shape).vertices[0].x() = far;
+  }
+  for (const auto& [surface, error] : bad)
+    EXPECT_EQ(message([&, each = surface] { SurfaceScene({square, each}); }), "surface 1: " + error);
 }
 
 /// The same rays end there alone, together and on their way to a light.

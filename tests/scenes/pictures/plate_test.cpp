@@ -89,6 +89,44 @@ TEST_F(PlatePicture, RgbModeIsThePapers) {
   }
 }
 
+TEST_F(PlatePicture, ThreadsDoNotChangeTheFilesAndTheSeedDoes) {
+  for (const std::string change : {"light.pattern=stratified", "light.pattern=sobol", "light.pattern=random",
+                                   "light.pattern=grid", R"(integrator={"type":"lens","mode":"scatter"})"}) {
+    const auto bytes = [&](int threads, const std::string& seed) {
+      Settings outputs{"out.exr", "out.png", "out.spectral.exr"};
+      if (change[0] == 'l') outputs.insert(outputs.end(), {"out.vtp", "out.fluence.vdb"});
+      render_all({change, "light.wavelengths.per_photon=1", "seed=" + seed}, outputs, threads);
+      std::string all;
+      for (const std::string& output : outputs) all += read_file(in_folder(output));
+      return all;
+    };
+    const std::string one = bytes(1, "5");
+    EXPECT_TRUE(bytes(7, "5") == one) << change;
+    EXPECT_TRUE(bytes(7, "6") != one || change == "light.pattern=grid" || change[0] == 'i') << change;
+  }
+}
+
+TEST_F(PlatePicture, OddLightIsWarnedOf) {
+  for (const auto& [setting, pattern] : std::vector<std::pair<std::string, std::string>>{
+           {"bending.a=0.5", "negative"},
+           {"bending.max_steps=1", "[0-9]+% of the rays.*max_steps"},
+           {"field.scale=1e-6", "light turns too little to be seen: `field.scale` .* shows"},
+           {"field.scale=3e4", "light is tangled: `field.scale` .* shows"},
+           {"field.scale=-1", "negative: light bends the other way"},
+           {"receiver={\"center\":[0,0,9],\"size\":[1,1]}", "the plate lies before the volume"},
+           {"receiver={\"center\":[0,0,-0.5],\"size\":[1,1]}", "the plate lies in the volume"},
+           {R"(field.generate={"kind":"constant","tensor":[[1,0,0],[0,1,0],[0,0,1]]})", "no probe ray is turned"}}) {
+    render_all({setting});
+    EXPECT_THAT(notes_, Contains(testing::ContainsRegex(pattern))) << setting;
+  }
+  render_all({"light.beam=volume", "receiver={\"center\":[900,0,-3],\"size\":[1,1]}"});
+  EXPECT_THAT(notes_, Contains(HasSubstr("no light reached the plate")));
+  for (const char* straight : {"bending={\"a\":0,\"b\":0}", "bending.rgb=[0.1,0,0.3]"}) {
+    render_all({"field.scale=1e-6", straight});
+    EXPECT_THAT(notes_, Not(Contains(HasSubstr("inf")))) << straight;
+  }
+}
+
 TEST_F(PlatePicture, IsSeenAlongTheLightAnywhere) {
   remove_field();
   const auto column_of_light = [&](Settings receiver) {

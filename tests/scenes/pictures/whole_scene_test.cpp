@@ -103,16 +103,15 @@ TEST_F(WholeScene, AnEvenSkyThroughTheFieldIsEvenIfRadianceIsConserved) {
 }
 
 TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
-  write("scene.json", R"({
-    "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "absolute"},
-    "integrator": {"type": "scene", "max_samples": 8, "min_samples": 8, "noise": 0,
-                   "caustic": {"resolution": 64, "rays": 4000, "passes": 1}},
-    "camera": {"resolution": [40, 32]},
-    "lights": [{"kind": "constant", "color": [0.2, 0.3, 0.6], "group": "around"},
+  const auto lit = [&](Settings changes) {
+    changes.insert(changes.begin(), {"integrator.max_samples=8", "integrator.min_samples=8",
+                                     R"(lights=[{"kind": "constant", "color": [0.2, 0.3, 0.6], "group": "around"},
                {"kind": "directional", "direction": [0.2, 0, -1], "angle": 2, "group": "sun"},
                {"kind": "point", "position": [1, 1, 3], "strength": 5, "group": "lamps"},
-               {"kind": "area", "center": [-1, 0, 3], "group": "lamps"}]})");
-  const Image photons = render({"lights.1.caustic=photons", "lights.2.caustic=photons"}), all = render({});
+               {"kind": "area", "center": [-1, 0, 3], "group": "lamps"}])"});
+    return render(changes);
+  };
+  const Image photons = lit({"lights.1.caustic=photons", "lights.2.caustic=photons"}), all = lit({});
   for (const std::string color : {"sun.G", "lamps.G"})
     EXPECT_NEAR(mean(photons, color), mean(all, color), 0.03 * mean(all, color)) << color;
   for (const char* color : {"R", "G", "B"}) {
@@ -125,7 +124,7 @@ TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
   }
   EXPECT_GE(mean(all, "folds"), 0.05);
   // A group has the light that the picture has if all others are dark.
-  const Image sun = render({"lights.0.strength=0", "lights.2.strength=0", "lights.3.strength=0"});
+  const Image sun = lit({"lights.0.strength=0", "lights.2.strength=0", "lights.3.strength=0"});
   EXPECT_NEAR(mean(all, "sun.G"), mean(sun, "G"), 0.1 * mean(sun, "G"));
 }
 
