@@ -81,17 +81,14 @@ class FieldAlone : public Program {
 
 TEST_F(FieldAlone, IsRenderedWithDefaultsAndTheSceneIsToldAndSaved) {
   std::filesystem::create_directory(in_folder("else where"));
-  const Outcome outcome =
-      run_well(with_small({"render", "stress.vdb", "-o", "alone.png", "--save-scene", "else where/stress.json"}));
+  const Outcome outcome = run_well(with_small(
+      {"render", "stress.vdb", "-o", "alone.png", "-o", "alone.exr", "--save-scene", "else where/stress.json"}));
   EXPECT_NE(outcome.error.find("scene: {\"field\":"), std::string::npos) << outcome.error;
   const json scene = read_json("else where/stress.json");
   EXPECT_EQ(scene["integrator"]["type"], "photon_distribution");
   EXPECT_EQ(scene["receiver"]["resolution"], json::array({24, 24}));
-  run_well({"render", "else where/stress.json", "-o", "again.png", "-q"});
-  const std::string picture = read_file(in_folder("alone.png"));
-  EXPECT_GT(picture.size(), 1000u);
+  EXPECT_GT(read_file(in_folder("alone.png")).size(), 1000u);
   // The pictures differ only in the name of the scene in their headers.
-  run_well(with_small({"render", "stress.vdb", "-o", "alone.exr", "-q"}));
   run_well({"render", "else where/stress.json", "-o", "again.exr", "-q"});
   EXPECT_EQ(read_image(in_folder("alone.exr")).pixels, read_image(in_folder("again.exr")).pixels);
 }

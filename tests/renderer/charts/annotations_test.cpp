@@ -135,16 +135,13 @@ std::vector<std::string> labels(const ValueRange& range, int most = 7) {
   return texts;
 }
 
-TEST(RoundTicksTest, LinearScales) {
+TEST(RoundTicksTest, ScalesAreLinearOrLogarithmic) {
   EXPECT_THAT(labels({0, 3.7}), ElementsAre("0", "1", "2", "3"));
   EXPECT_THAT(labels({0, 1}), ElementsAre("0", "0.2", "0.4", "0.6", "0.8", "1.0"));
   EXPECT_THAT(labels({-0.012, 0.03}), ElementsAre("-0.01", "0", "0.01", "0.02", "0.03"));
   EXPECT_THAT(labels({1000, 1002}, 3), ElementsAre("1000", "1001", "1002"));
   EXPECT_THAT(labels({-2.4e-6, 2.4e-6}), ElementsAre("-2e-6", "-1e-6", "0", "1e-6", "2e-6"));
   EXPECT_THAT(labels({0, 3e7}), ElementsAre("0", "0.5e7", "1.0e7", "1.5e7", "2.0e7", "2.5e7", "3.0e7"));
-}
-
-TEST(RoundTicksTest, LogarithmicScales) {
   EXPECT_THAT(labels({2e-4, 0.7, true}), ElementsAre("0.001", "0.01", "0.1"));
   EXPECT_THAT(labels({1, 1000, true}), ElementsAre("1", "10", "100", "1000"));
   EXPECT_THAT(labels({3, 30, true}), ElementsAre("5", "10", "20"));

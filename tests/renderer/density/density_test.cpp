@@ -1,6 +1,5 @@
 #include "renderer/density/density.h"
 
-#include <limits>
 #include <random>
 #include <stdexcept>
 
@@ -100,9 +99,8 @@ TEST(Density, HistogramCountsInThePixel) {
 
 TEST(Density, FootprintsAreNeitherLostNorMade) {
   DensityEstimator deposit(40, 30, 2, footprints);
-  const double huge = 1e30, infinite = std::numeric_limits<double>::infinity();
   for (const Vector2d& at : {Vector2d(0, 0), Vector2d(40, 30), Vector2d(20.3, 0.1), Vector2d(7, 29.999)})
-    for (const double size : {0.0, 0.1, 2.0, 15.0, huge, infinite, std::nan("")})
+    for (const double size : {0.0, 0.1, 2.0, 15.0, 1e30, double{INFINITY}, double{NAN}})
       deposit.add(1, at, Vector2d(size, 3).asDiagonal().toDenseMatrix());
   const Film film = deposit.finish(2);
   EXPECT_NEAR(sum_of(film, 1), 2 * 4 * 7, 1e-7);

@@ -266,28 +266,6 @@ TEST(ReadMeshTest, EveryWayToWriteAnObjFace) {
   }
 }
 
-TEST(ReadMeshTest, ObjErrorsNameTheLine) {
-  const std::string vertices = "v 0 0 0\nv 2 0 0\nv 0 2 0\n";
-  for (const auto& [rest, text] :
-       std::vector<std::pair<std::string, std::string>>{{"f 1 2 0\n", "line 4: the face names vertex 0"},
-                                                        {"f 1 2 3\nf 1 2 -4\n", "line 5: the face names vertex -4"},
-                                                        {"f 1//1 2//1 3//1\n", "line 4: the face names normal 1 of 0"},
-                                                        {"f 1 2 x\n", "line 4: the face has \"x\""},
-                                                        {"f 1 2 3x\n", "line 4: the face has \"3x\""},
-                                                        {"f 1 2\n", "line 4: a face needs at least three"},
-                                                        {"v 1 2\n", "line 4: \"v\" needs three numbers"},
-                                                        {"v 1 2 three\n", "line 4: \"three\" is not a number"},
-                                                        {"v 1e400 0 0\nf 1 2 4\n", "vertex 2 is not finite"},
-                                                        {"surf 0 1 0 1 1 2\n", "line 4: \"surf\" is not read"},
-                                                        {"F 1 2 3\n", "line 4: \"F\" is not read"},
-                                                        {"v 0 0 0 0\n", "line 4: the vertex has the weight 0"}}) {
-    const Temporary file("bad.obj", vertices + rest);
-    EXPECT_THAT(message([&] { read_mesh(file.path()); }), HasSubstr(text)) << rest;
-  }
-  const Temporary file("two.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n");
-  EXPECT_THAT(message([&] { read_mesh(file.path()); }), HasSubstr("face 0 has 2 corners"));
-}
-
 /// A tetrahedron with corners at 1, 2 and 3 along the axes of its file.
 std::string collada(const std::string& asset) {
   return R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>)" +
@@ -372,7 +350,8 @@ std::string replaced(std::string text, const std::string& part, const std::strin
 }
 
 TEST(ReadMeshTest, BadFilesAreOneClearLine) {
-  const std::string garbage = "no mesh at all\n\x01\x02\x03 v f\n", tetrahedron = tetrahedron_ply;
+  const std::string garbage = "no mesh at all\n\x01\x02\x03 v f\n", tetrahedron = tetrahedron_ply,
+                    three = "v 0 0 0\nv 2 0 0\nv 0 2 0\n";
   const std::string strip =
       "ply\nformat binary_little_endian 1.0\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n";
   struct Case {
@@ -387,6 +366,19 @@ TEST(ReadMeshTest, BadFilesAreOneClearLine) {
            {"points.ply", ply_header("ascii", 2, 0) + "0 0 0\n1 1 1\n", "no triangles"},
            {"lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", "no triangles"},
            {"flat.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n", "no triangles"},
+           {"bad.obj", three + "f 1 2 0\n", "line 4: the face names vertex 0"},
+           {"bad.obj", three + "f 1 2 3\nf 1 2 -4\n", "line 5: the face names vertex -4"},
+           {"bad.obj", three + "f 1//1 2//1 3//1\n", "line 4: the face names normal 1 of 0"},
+           {"bad.obj", three + "f 1 2 x\n", "line 4: the face has \"x\""},
+           {"bad.obj", three + "f 1 2 3x\n", "line 4: the face has \"3x\""},
+           {"bad.obj", three + "f 1 2\n", "line 4: a face needs at least three"},
+           {"bad.obj", three + "v 1 2\n", "line 4: \"v\" needs three numbers"},
+           {"bad.obj", three + "v 1 2 three\n", "line 4: \"three\" is not a number"},
+           {"bad.obj", three + "v 1e400 0 0\nf 1 2 4\n", "vertex 2 is not finite"},
+           {"bad.obj", three + "surf 0 1 0 1 1 2\n", "line 4: \"surf\" is not read"},
+           {"bad.obj", three + "F 1 2 3\n", "line 4: \"F\" is not read"},
+           {"bad.obj", three + "v 0 0 0 0\n", "line 4: the vertex has the weight 0"},
+           {"two.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "face 0 has 2 corners"},
            {"index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "line 4: the face names vertex 9 of 3"},
            {"nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"},
            {"index.ply", replaced(tetrahedron, "3 1 2 3", "3 1 2 4"), "not there"},
