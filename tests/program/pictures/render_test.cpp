@@ -22,6 +22,37 @@ TEST_F(Program, WritesPictureAndExrBesideTheScene) {
   EXPECT_EQ(quiet.out + quiet.error, "");
 }
 
+/// Of all options, these change the bytes in no way, or in all that is drawn at random.
+TEST_F(Program, ThreadsDoNotChangeTheFilesAndTheSeedDoes) {
+  write("scene.json", small_scene());
+  for (const std::string change : {"light.pattern=stratified", "light.pattern=sobol", "light.pattern=random",
+                                   "light.pattern=grid", R"(integrator={"type":"lens","mode":"scatter"})"}) {
+    const auto bytes = [&](const char* threads, const char* seed) {
+      Arguments arguments{"render",
+                          "scene.json",
+                          "-q",
+                          "--threads",
+                          threads,
+                          "--seed",
+                          seed,
+                          "--set",
+                          change,
+                          "--set",
+                          "light.wavelengths.per_photon=1"};
+      std::vector<std::string> endings{"exr", "png", "spectral.exr"};
+      if (change[0] == 'l') endings.insert(endings.end(), {"vtp", "fluence.vdb"});
+      for (const std::string& ending : endings) arguments.insert(arguments.end(), {"-o", "out." + ending});
+      run_well(arguments);
+      std::string all;
+      for (const std::string& ending : endings) all += read_file(in_folder("out." + ending));
+      return all;
+    };
+    const std::string one = bytes("1", "5");
+    EXPECT_TRUE(bytes("7", "5") == one) << change;
+    EXPECT_TRUE(bytes("7", "6") != one || change == "light.pattern=grid" || change[0] == 'i') << change;
+  }
+}
+
 TEST_F(Program, ProvenanceIsInTheHeader) {
   write("scene.json", small_scene());
   run_well({"render", "scene.json", "-q", "-o", "out.exr", "--seed", "77"});

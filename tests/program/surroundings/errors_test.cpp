@@ -81,7 +81,7 @@ std::string repeated(const std::string& text, int times) {
 }
 
 /// Files that end their reader, or that it would read for ever; and those that are missing or open.
-TEST_F(Errors, Meshes) {
+TEST_F(Errors, HostileMeshes) {
   expect_scene_error(1, "none.ply", R"(obstacles=[{"file":"none.ply"}])");
   write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   expect_scene_error(1, "open.obj.*3 open edges|open.obj.*closed", "field.bounds=open.obj");

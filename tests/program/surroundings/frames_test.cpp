@@ -165,13 +165,15 @@ class RenderArray : public Program {
       R"(3 scene.json -o a.exr --set 'camera={"resolution": [40, 30]}' --output a.png -q)";
 };
 
-TEST_F(RenderArray, QueuesMergeWhatTheirTasksMake) {
+TEST_F(RenderArray, SlurmMergesWhatItsTasksMake) {
   put_in_path("sbatch", sbatch);
   expect_pictures(render_array("--with 'sbatch --partition=night' " + scene_and_pictures));
   const std::string queue = read_file(in_folder("queue.log"));
   EXPECT_EQ(queue.find("--partition=night --parsable --array=1-3 "), 0U) << queue;
   EXPECT_NE(queue.find("\n--partition=night --dependency=afterok:17 "), std::string::npos) << queue;
-  std::filesystem::remove(in_folder("queue.log"));
+}
+
+TEST_F(RenderArray, ParallelMergesWhatItsTasksMake) {
   put_in_path("parallel", parallel);
   expect_pictures(render_array("--with 'parallel --jobs 1' " + scene_and_pictures));
   EXPECT_EQ(read_file(in_folder("queue.log")).find("--jobs 1 -q -I @TASK@ "), 0U);

@@ -112,16 +112,21 @@ class DividedWork : public KeptWork, public testing::WithParamInterface<std::str
   std::string scene() const override { return GetParam(); }
 };
 
-/// Killed twice and continued, on any number of threads, and in shards.
-TEST_P(DividedWork, GivesTheSameFiles) {
+TEST_P(DividedWork, ThatIsKilledContinuesToTheSameFiles) {
   for (int i = 0; i < 2; ++i) EXPECT_EQ(end_by(SIGKILL, {"--threads", "1"}).status, 128 + SIGKILL);
   run_well(render("a", {"--resume"}));
   expect_same("a");
   EXPECT_FALSE(has("a.png.checkpoint"));
+}
+
+TEST_P(DividedWork, IsTheSameOnAnyNumberOfThreads) {
   for (const char* threads : {"1", "7"}) {
     run_well(render("a", {"--threads", threads}));
     expect_same("a");
   }
+}
+
+TEST_P(DividedWork, OfShardsMergesToTheSameFiles) {
   make_shards(3);
   run_well(merge({"3.shard", "1.shard", "2.shard"}));
   expect_same("a");

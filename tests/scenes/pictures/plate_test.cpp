@@ -89,23 +89,6 @@ TEST_F(PlatePicture, RgbModeIsThePapers) {
   }
 }
 
-TEST_F(PlatePicture, ThreadsDoNotChangeTheFilesAndTheSeedDoes) {
-  for (const std::string change : {"light.pattern=stratified", "light.pattern=sobol", "light.pattern=random",
-                                   "light.pattern=grid", R"(integrator={"type":"lens","mode":"scatter"})"}) {
-    const auto bytes = [&](int threads, const std::string& seed) {
-      Settings outputs{"out.exr", "out.png", "out.spectral.exr"};
-      if (change[0] == 'l') outputs.insert(outputs.end(), {"out.vtp", "out.fluence.vdb"});
-      render_all({change, "light.wavelengths.per_photon=1", "seed=" + seed}, outputs, threads);
-      std::string all;
-      for (const std::string& output : outputs) all += read_file(in_folder(output));
-      return all;
-    };
-    const std::string one = bytes(1, "5");
-    EXPECT_TRUE(bytes(7, "5") == one) << change;
-    EXPECT_TRUE(bytes(7, "6") != one || change == "light.pattern=grid" || change[0] == 'i') << change;
-  }
-}
-
 TEST_F(PlatePicture, OddLightIsWarnedOf) {
   for (const auto& [setting, pattern] : std::vector<std::pair<std::string, std::string>>{
            {"bending.a=0.5", "negative"},

@@ -48,6 +48,11 @@ class WholeScene : public Pictures {
   }
 };
 
+TEST_F(WholeScene, HasTheSameBytesOnAnyNumberOfThreads) {
+  const Image one = render({}, {}, 1);
+  for (const int threads : {2, 7}) EXPECT_EQ(one.pixels, render({}, {}, threads).pixels) << threads;
+}
+
 TEST_F(WholeScene, BendsWhatTheCameraSeesAndTheSunsLight) {
   const Image image = render({});
   EXPECT_GT(mean(image, "deflection"), 0.01);
