@@ -12,8 +12,6 @@
 namespace tensorray {
 namespace {
 
-using nlohmann::json;
-
 class PlatePicture : public Pictures {
  protected:
   PlatePicture() { write("scene.json", small_scene()); }
