@@ -46,21 +46,21 @@ class TurningBall : public BendingRegion {
 };
 
 const TestBands& four_bands() {
-  static const TestBands bands({{620, 60, 0.25, Vector3d(1, 0.3, 0)},
-                                {560, 60, 0.25, Vector3d(0.2, 0.5, 0)},
-                                {500, 60, 0.25, Vector3d(0, 0.15, 0.2)},
-                                {440, 60, 0.25, Vector3d(0.1, 0.05, 0.8)}});
-  return bands;
+  static const TestBands result({{620, 60, 0.25, Vector3d(1, 0.3, 0)},
+                                 {560, 60, 0.25, Vector3d(0.2, 0.5, 0)},
+                                 {500, 60, 0.25, Vector3d(0, 0.15, 0.2)},
+                                 {440, 60, 0.25, Vector3d(0.1, 0.05, 0.8)}});
+  return result;
 }
 
 std::vector<float> even(float value) { return four_bands().even(value); }
 
 /// A floor below the ball, lit by `lights`, of which the first may be the area light of a lamp.
 struct Stage : World {
-  explicit Stage(const std::vector<Light>& light_list, double albedo = 0.6)
-      : World(four_bands(), parts(light_list),
+  explicit Stage(const std::vector<Light>& all_lights, double albedo = 0.6)
+      : World(four_bands(), parts(all_lights),
               {make_material(Diffuse{}, four_bands().grey(albedo)), make_material(Diffuse{}, four_bands().grey(0))},
-              light_list) {}
+              all_lights) {}
 
   static std::vector<ShadedSurface> parts(const std::vector<Light>& lights) {
     std::vector<ShadedSurface> result{surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8}))};
