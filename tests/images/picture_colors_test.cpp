@@ -1,6 +1,5 @@
 // What picture files say about their colours and their position, and what is made of it.
 
-#include <cstdlib>
 #include <functional>
 #include <limits>
 #include <tuple>

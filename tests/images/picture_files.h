@@ -90,7 +90,7 @@ inline std::string tiff_directory(const TiffTags& tags) {
   return directory + little_endian(std::uint32_t{0});
 }
 
-/// A TIFF of one strip. @param photometric  2: RGB, 5: CMYK.
+/// A TIFF of one strip. @param photometric  1: grey, 2: RGB, 5: CMYK.
 /// @param more  Further tags, such as 338: the meaning of the channel after the colours (1: alpha, colours multiplied
 /// by it, 2: alpha, colours not multiplied by it).
 inline std::string tiff_file(int width, int height, int channels, int bits, int photometric, const std::string& pixels,

@@ -5,7 +5,6 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <thread>
 
 #include <fcntl.h>
@@ -32,6 +31,13 @@ struct Outcome {
   std::string out, error;
 };
 
+using Arguments = std::vector<std::string>;
+
+inline Arguments joined(Arguments first, const Arguments& more) {
+  first.insert(first.end(), more.begin(), more.end());
+  return first;
+}
+
 /// Makes a folder for each test, and removes it after the test.
 class Program : public ::testing::Test {
  protected:
@@ -40,13 +46,10 @@ class Program : public ::testing::Test {
   std::filesystem::path in_folder(const std::string& name) const { return folder_ / name; }
 
   /// Starts the program with the test's folder as working folder. @return its process.
-  pid_t start(const std::vector<std::string>& arguments, long file_size_limit = 0) const {
-    return start_in(file_size_limit > 0 ? "ulimit -f " + std::to_string(file_size_limit) + "; exec" : "exec",
-                    arguments);
-  }
+  pid_t start(const Arguments& arguments) const { return start_in("exec", arguments); }
 
   /// The same. @param shell  Commands of the shell before the program; the last word runs it: "cd /; exec".
-  pid_t start_in(const std::string& shell, const std::vector<std::string>& arguments) const {
+  pid_t start_in(const std::string& shell, const Arguments& arguments) const {
     const pid_t child = fork();
     if (child != 0) return child;
     if (chdir(in_folder("").c_str()) != 0) _exit(126);
@@ -75,13 +78,15 @@ class Program : public ::testing::Test {
             read_file(in_folder("stderr"))};
   }
 
-  /// @param file_size_limit  Blocks of 512 bytes. Imitates a full disk; 0: no limit.
-  Outcome run(const std::vector<std::string>& arguments, long file_size_limit = 0) const {
-    return wait_for(start(arguments, file_size_limit));
+  Outcome run(const Arguments& arguments) const { return wait_for(start(arguments)); }
+
+  /// A full disk: no file has more than some blocks of 512 bytes.
+  Outcome run_with_blocks(int blocks, const Arguments& arguments) const {
+    return wait_for(start_in("ulimit -f " + std::to_string(blocks) + "; exec", arguments));
   }
 
   /// Runs the program, which must succeed.
-  Outcome run_well(const std::vector<std::string>& arguments) const {
+  Outcome run_well(const Arguments& arguments) const {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.status, 0) << outcome.error;
     return outcome;
@@ -104,7 +109,7 @@ class Program : public ::testing::Test {
   }
 
   /// Runs the program, which must end so.
-  void expect_error(const std::string& text, const std::vector<std::string>& arguments, int status = 0) const {
+  void expect_error(const std::string& text, const Arguments& arguments, int status = 0) const {
     expect_one_line(run(arguments), text, status);
   }
 

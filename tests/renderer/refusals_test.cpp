@@ -1,6 +1,5 @@
 // What the functions of all rooms refuse, with what their errors say of it.
 
-#include <limits>
 #include <stdexcept>
 
 #include "renderer/camera/camera.h"
@@ -22,7 +21,7 @@
 namespace tensorray {
 namespace {
 
-const double nan_value = std::nan(""), infinite = std::numeric_limits<double>::infinity();
+constexpr double nan_value = NAN, infinite = INFINITY;
 
 /// @param text  A part of the error.
 template <class Action>

@@ -171,7 +171,6 @@ TEST(BodyOutlineTest, ShellsThatTouchHaveNoLineBetweenThem) {
   EXPECT_NEAR(stroke_lengths(strokes, {30, 45}, {70, 45})[0], 2 * 40, 1e-9);
 }
 
-/// A ball of fine triangles has its silhouette and no other line.
 TEST(BodyOutlineTest, ABallIsACircle) {
   TriangleMesh ball = std::get<TriangleMesh>(sphere(60).shape);
   for (Vector3d& vertex : ball.vertices) vertex = 9 * vertex + Vector3d(5, 0, 0);

@@ -156,50 +156,48 @@ TEST(Annotations, ShowBodies) {
   EXPECT_THAT(rendered(methods[0], "body").render.warnings.back(), HasSubstr("no lines of a body"));
 }
 
-/// A scene's units are its own, else those of the field's file.
-TEST(Annotations, KnowTheUnitsOfAScene) {
+/// The units of a scene of a field in a file. @param field  More keys of it. @param metadata  Of the file.
+FieldUnits units_with(const ImageMetadata& metadata, const Json& field, const Json& world) {
   const TemporaryFolder folder;
   TensorGrid grid = generate(Helix{}, default_grid(Helix{}, 9));
-  const auto units = [&](const Json& field, const Json& world) {
-    Json json{{"field", {{"file", (folder / "field.vdb").string()}, {"scale", 1}}},
-              {"world", world},
-              {"integrator", {{"type", "stretch"}}}};
-    json["field"].update(field);
-    return units_of(load_scene(read_scene_json(json, "scene.json"), Progress()));
-  };
+  for (const auto& [key, value] : metadata) grid.metadata["tensorray:" + key] = value;
   write_tensor_vdb(folder / "field.vdb", grid);
-  EXPECT_EQ(units(Json::object(), Json::object()).length, "");
-  EXPECT_EQ(units(Json::object(), Json::object()).tensor, "1/length");
-  EXPECT_FALSE(units(Json::object(), Json::object()).is_anatomical);
-  for (const auto& [key, value] : {std::pair("units", "mm^2/s"), {"world_unit", "mm"}, {"world_axes", "RAS"}})
-    grid.metadata[std::string("tensorray:") + key] = value;
-  write_tensor_vdb(folder / "field.vdb", grid);
-  EXPECT_EQ(units(Json::object(), Json::object()).length, "mm");
-  EXPECT_EQ(units(Json::object(), Json::object()).tensor, "mm^2/s");
-  EXPECT_TRUE(units(Json::object(), {{"up", "y"}}).is_anatomical);
-  EXPECT_EQ(units({{"unit", "MPa"}}, {{"unit", "in"}}).tensor, "MPa");
-  EXPECT_EQ(units({{"derive", "viscous_stress"}}, {{"unit", "in"}}).tensor, "mm^2/s");
-  EXPECT_EQ(units({{"unit", "MPa"}}, {{"unit", "in"}}).length, "in");
+  Json json{{"field", {{"file", (folder / "field.vdb").string()}, {"scale", 1}}},
+            {"world", world},
+            {"integrator", {{"type", "stretch"}}}};
+  json["field"].update(field);
+  return units_of(load_scene(read_scene_json(json, "scene.json"), Progress()));
+}
+
+/// A scene's units are its own, else those of the field's file.
+TEST(Annotations, KnowTheUnitsOfAScene) {
+  const Json none = Json::object();
+  const FieldUnits unknown = units_with({}, none, none);
+  EXPECT_EQ(unknown.length, "");
+  EXPECT_EQ(unknown.tensor, "1/length");
+  EXPECT_FALSE(unknown.is_anatomical);
+  const ImageMetadata file{{"units", "mm^2/s"}, {"world_unit", "mm"}, {"world_axes", "RAS"}};
+  EXPECT_EQ(units_with(file, none, none).length, "mm");
+  EXPECT_EQ(units_with(file, none, none).tensor, "mm^2/s");
+  EXPECT_TRUE(units_with(file, none, {{"up", "y"}}).is_anatomical);
+  const FieldUnits own = units_with(file, {{"unit", "MPa"}}, {{"unit", "in"}});
+  EXPECT_EQ(own.tensor, "MPa");
+  EXPECT_EQ(own.length, "in");
+  EXPECT_EQ(units_with(file, {{"derive", "viscous_stress"}}, {{"unit", "in"}}).tensor, "mm^2/s");
 }
 
 /// A gradient has the unit of its vector by that of lengths, and a stress of viscosity 1 that of its gradient.
 TEST(Annotations, KnowTheUnitsOfDerivatives) {
-  const TemporaryFolder folder;
-  const auto unit = [&](const std::string& of_vector, const char* derive, const char* length) {
-    TensorGrid grid = generate(Helix{}, default_grid(Helix{}, 9));
-    grid.metadata["tensorray:units"] = of_vector;
-    write_tensor_vdb(folder / "field.vdb", grid);
-    const std::string row = grid.name + "_row0";
-    const Json field{{"file", (folder / "field.vdb").string()}, {"scale", 1}, {"name", row}, {"derive", derive}};
-    const Json json{{"field", field}, {"world", {{"unit", length}}}, {"integrator", {{"type", "stretch"}}}};
-    return units_of(load_scene(read_scene_json(json, "scene.json"), Progress())).tensor;
+  const std::string row = generate(Helix{}, default_grid(Helix{}, 9)).name + "_row0";
+  struct Case {
+    const char *of_vector, *derive, *length, *unit;
   };
-  EXPECT_EQ(unit("m/s", "gradient", "m"), "1/s");
-  EXPECT_EQ(unit("m/s", "-viscous_stress", "m"), "1/s");
-  EXPECT_EQ(unit("m/s", "viscous_stress", "mm"), "m/s/mm");
-  EXPECT_EQ(unit("mm", "gradient", "mm"), "1");
-  EXPECT_EQ(unit("mm^2/s", "gradient", "mm"), "mm^2/s/mm");
-  EXPECT_EQ(unit("m/s", "gradient", ""), "m/s/length");
+  for (const Case& each : {Case{"m/s", "gradient", "m", "1/s"}, Case{"m/s", "-viscous_stress", "m", "1/s"},
+                           Case{"m/s", "viscous_stress", "mm", "m/s/mm"}, Case{"mm", "gradient", "mm", "1"},
+                           Case{"mm^2/s", "gradient", "mm", "mm^2/s/mm"}, Case{"m/s", "gradient", "", "m/s/length"}})
+    EXPECT_EQ(units_with({{"units", each.of_vector}}, {{"name", row}, {"derive", each.derive}}, {{"unit", each.length}})
+                  .tensor,
+              each.unit);
 }
 
 /// Pixels of a plate have its size / resolution, those of a camera its height / resolution.

@@ -41,6 +41,11 @@ class ReadScene : public ::testing::Test {
     return "";
   }
 
+  /// Expects an error whose message has a part.
+  void refuses(const std::string& part, const Overrides& overrides, const std::string& text = smallest) const {
+    EXPECT_THAT(error(overrides, text), ::testing::HasSubstr(part));
+  }
+
   const TemporaryFolder temporary_;
   const std::filesystem::path folder_ = temporary_ / "";
 };

@@ -1,9 +1,5 @@
 #include "integrators/methods/read_scene.h"
 
-#include <cstdlib>
-#include <fstream>
-
-#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
 #include "integrators/lens/lens_method.h"
@@ -61,13 +57,12 @@ TEST_F(ReadScene, ReadsEveryKindOfValue) {
 }
 
 TEST_F(ReadScene, WrongLensesAreRefused) {
-  EXPECT_THAT(error({"integrator.image=chekerboard"}), HasSubstr("\"checkerboard\", \"grid\", \"color_wheel\""));
-  EXPECT_THAT(error({"integrator.image_plane.depth=[]"}), HasSubstr("a number, or a list of them"));
-  EXPECT_THAT(error({"integrator.image_plane.depth=[0,\"a\"]"}), HasSubstr("a number, or a list of them"));
-  EXPECT_THAT(error({"integrator.image_plane.depth=0", "integrator.image_plane.distance=1"}),
-              HasSubstr("/integrator/image_plane"));
-  EXPECT_THAT(error({"integrator.image_plane.normal=[1,0,0]"}), HasSubstr("is perpendicular to the light"));
-  EXPECT_THAT(error({"integrator.samples=0"}), HasSubstr("an integer from 1 to 16"));
+  refuses("\"checkerboard\", \"grid\", \"color_wheel\"", {"integrator.image=chekerboard"});
+  refuses("a number, or a list of them", {"integrator.image_plane.depth=[]"});
+  refuses("a number, or a list of them", {"integrator.image_plane.depth=[0,\"a\"]"});
+  refuses("/integrator/image_plane", {"integrator.image_plane.depth=0", "integrator.image_plane.distance=1"});
+  refuses("is perpendicular to the light", {"integrator.image_plane.normal=[1,0,0]"});
+  refuses("an integer from 1 to 16", {"integrator.samples=0"});
 }
 
 TEST_F(ReadScene, WordsStandForNoValue) {
@@ -120,30 +115,35 @@ TEST_F(ReadScene, OverridesChangeAddAndRemove) {
 }
 
 TEST_F(ReadScene, OverridesAreChecked) {
-  EXPECT_THAT(error({"seed"}), HasSubstr("must be KEY=VALUE"));
-  EXPECT_THAT(error({"=3"}), HasSubstr("must be KEY=VALUE"));
-  EXPECT_THAT(error({"light..photons=3"}), HasSubstr("one dot"));
-  EXPECT_THAT(error({"field.file.x=3"}), HasSubstr("`x` has no place in \"a.vdb\""));
-  EXPECT_THAT(error({"obstacles.0.file=a", "obstacles.7.file=a"}), HasSubstr("no item 7"));
-  EXPECT_THAT(error({"obstacles.0.file=a", "obstacles.x.file=a"}), HasSubstr("must be a number"));
-  EXPECT_THAT(error({"seed=" + std::string(100000, '[')}), HasSubstr("nested deeper"));
+  refuses("must be KEY=VALUE", {"seed"});
+  refuses("must be KEY=VALUE", {"=3"});
+  refuses("one dot", {"light..photons=3"});
+  refuses("`x` has no place in \"a.vdb\"", {"field.file.x=3"});
+  refuses("no item 7", {"obstacles.0.file=a", "obstacles.7.file=a"});
+  refuses("must be a number", {"obstacles.0.file=a", "obstacles.x.file=a"});
+  refuses("nested deeper", {"seed=" + std::string(100000, '[')});
   std::string deep = "a";
   for (int i = 0; i < 100000; ++i) deep += ".a";
-  EXPECT_THAT(error({deep + "=1"}), HasSubstr("deeper"));
+  refuses("deeper", {deep + "=1"});
 }
 
 TEST_F(ReadScene, UnknownKeysAreRefusedWithTheNearest) {
   const std::string file = (folder_ / "scene.json").string();
   EXPECT_EQ(error({"lihgt.photons=1"}), file + ": unknown key `/lihgt`; did you mean `light`?");
-  EXPECT_THAT(error({"light.photon=1"}), HasSubstr("`/light/photon`; did you mean `photons`?"));
-  EXPECT_THAT(error({"light.wavelengths.cuont=1"}), HasSubstr("`/light/wavelengths/cuont`; did you mean `count`?"));
-  EXPECT_THAT(error({"obstacles.0.fiel=a"}), HasSubstr("`/obstacles/0/fiel`; did you mean `file`?"));
-  EXPECT_THAT(error({"weather={}"}),
-              HasSubstr("unknown key `/weather`; known keys are `$schema`, `bending`, `camera`"));
-  EXPECT_THAT(error({"a/b~c=1"}), HasSubstr("`/a~1b~0c`"));
-  EXPECT_THAT(error({std::string(5000, 'x') + "=1"}), HasSubstr("known keys"));
-  EXPECT_THAT(error({"field.file=null", "field.generate={\"kind\":\"helix\",\"lod\":1}"}),
-              HasSubstr("unknown key `/field/generate/lod`"));
+  refuses("`/light/photon`; did you mean `photons`?", {"light.photon=1"});
+  refuses("`/light/wavelengths/cuont`; did you mean `count`?", {"light.wavelengths.cuont=1"});
+  refuses("`/obstacles/0/fiel`; did you mean `file`?", {"obstacles.0.fiel=a"});
+  refuses("unknown key `/weather`; known keys are `$schema`, `bending`, `camera`", {"weather={}"});
+  refuses("`/a~1b~0c`", {"a/b~c=1"});
+  refuses("known keys", {std::string(5000, 'x') + "=1"});
+  // Of other programs.
+  refuses("`/camera/fov`; here it is camera.angle", {"camera.fov=30"});
+  refuses("`/integrator/spp`; here it is integrator.max_samples", {"integrator.spp=64"});
+  EXPECT_THAT(error({"light.intensity=3"}), AllOf(HasSubstr("`; here it is "), HasSubstr("light.irradiance")));
+  refuses("location`; did you mean `position`", {R"(lights=[{"location":[0,0,1]}])"});
+  refuses("/path`; did you mean `paths`", {R"(objects=[{"path":"a.obj"}])"});
+  refuses("/seeds/origin`; known keys are", {"integrator.seeds.origin=[0,0,1]"});
+  refuses("unknown key `/field/generate/lod`", {"field.file=null", "field.generate={\"kind\":\"helix\",\"lod\":1}"});
 }
 
 TEST_F(ReadScene, WrongTypesSayWhatIsExpectedAndFound) {
@@ -151,18 +151,19 @@ TEST_F(ReadScene, WrongTypesSayWhatIsExpectedAndFound) {
   EXPECT_EQ(error({"output.white_balance=1"}), file + ": `/output/white_balance` must be true or false, but is 1");
   EXPECT_THAT(error({"light.photons=many"}),
               AllOf(HasSubstr("`/light/photons` must be an integer"), EndsWith("but is \"many\"")));
-  EXPECT_THAT(error({"bending.method=rk5"}),
-              HasSubstr("must be one of \"auto\", \"euler\", \"splitting\", \"splitting4\", \"rk4\", \"bs23\", "
-                        "\"dopri5\", but is \"rk5\""));
+  refuses(
+      "must be one of \"auto\", \"euler\", \"splitting\", \"splitting4\", \"rk4\", \"bs23\", "
+      "\"dopri5\", but is \"rk5\"",
+      {"bending.method=rk5"});
   EXPECT_THAT(error({"integrator.type=lenses"}),
               AllOf(HasSubstr("must be one of \"photon_distribution\", \"lens\", "), EndsWith("but is \"lenses\"")));
-  EXPECT_THAT(error({"light=[]"}), HasSubstr("`/light` must be an object"));
-  EXPECT_THAT(error({"obstacles={}"}), HasSubstr("`/obstacles` must be a list of objects"));
-  EXPECT_THAT(error({"obstacles=[1]"}), HasSubstr("`/obstacles/0` must be an object"));
-  EXPECT_THAT(error({"field.file="}), HasSubstr("`/field/file` must be a file name, but is \"\""));
-  EXPECT_THAT(error({"field.scale=x"}), HasSubstr("must be a number other than 0, or \"auto\", but is \"x\""));
-  EXPECT_THAT(error({"light.direction=[0,1]"}), HasSubstr("a list of 3 numbers"));
-  EXPECT_THAT(error({"light.direction=[0,1,null]"}), HasSubstr("a list of 3 numbers"));
+  refuses("`/light` must be an object", {"light=[]"});
+  refuses("`/obstacles` must be a list of objects", {"obstacles={}"});
+  refuses("`/obstacles/0` must be an object", {"obstacles=[1]"});
+  refuses("`/field/file` must be a file name, but is \"\"", {"field.file="});
+  refuses("must be a number other than 0, or \"auto\", but is \"x\"", {"field.scale=x"});
+  refuses("a list of 3 numbers", {"light.direction=[0,1]"});
+  refuses("a list of 3 numbers", {"light.direction=[0,1,null]"});
 }
 
 /// What no bound of the schema refuses; schema_test.cpp has the others.
@@ -185,16 +186,15 @@ TEST_F(ReadScene, ValuesOutOfRange) {
 
 TEST_F(ReadScene, GeneratorsAreChecked) {
   const std::string start = R"({"integrator": {"type": "photon_distribution"}, "field": {"generate": )";
-  EXPECT_THAT(error({}, start + "{}}}"), HasSubstr("`/field/generate` needs the key `kind`"));
-  EXPECT_THAT(error({}, start + R"({"kind": "hleix"}}})"), HasSubstr("`helix`, but is \"hleix\""));
-  EXPECT_THAT(error({}, start + R"({"kind": 3}}})"), HasSubstr("`/field/generate/kind` must be one of"));
-  EXPECT_THAT(error({}, start + R"({"kind": "point_load", "poisson_ratio": 0.7}}})"), HasSubstr("poisson_ratio"));
-  EXPECT_THAT(error({}, start + R"({"kind": "rotation", "axis": [0, 0, 0]}}})"), HasSubstr("axis"));
-  EXPECT_THAT(error({}, start + R"({"kind": "helix", "min": [2, 0, 0]}}})"), HasSubstr("`max`"));
-  EXPECT_THAT(error({}, start + R"({"kind": "helix", "resolution": 0}}})"), HasSubstr("`/field/generate/resolution`"));
-  EXPECT_THAT(error({}, start + R"({"kind": "helix", "resolution": 20000}}})"), HasSubstr("2^31"));
-  EXPECT_THAT(error({}, start + R"({"kind": "constant", "tensor": [1,0,0,0,1,0,0,0,1]}}})"),
-              HasSubstr("3 rows of 3 numbers"));
+  refuses("`/field/generate` needs the key `kind`", {}, start + "{}}}");
+  refuses("`helix`, but is \"hleix\"", {}, start + R"({"kind": "hleix"}}})");
+  refuses("`/field/generate/kind` must be one of", {}, start + R"({"kind": 3}}})");
+  refuses("poisson_ratio", {}, start + R"({"kind": "point_load", "poisson_ratio": 0.7}}})");
+  refuses("axis", {}, start + R"({"kind": "rotation", "axis": [0, 0, 0]}}})");
+  refuses("`max`", {}, start + R"({"kind": "helix", "min": [2, 0, 0]}}})");
+  refuses("`/field/generate/resolution`", {}, start + R"({"kind": "helix", "resolution": 0}}})");
+  refuses("2^31", {}, start + R"({"kind": "helix", "resolution": 20000}}})");
+  refuses("3 rows of 3 numbers", {}, start + R"({"kind": "constant", "tensor": [1,0,0,0,1,0,0,0,1]}}})");
 }
 
 TEST_F(ReadScene, KeysThatAreMissingOrExcludeEachOther) {
@@ -203,19 +203,18 @@ TEST_F(ReadScene, KeysThatAreMissingOrExcludeEachOther) {
   EXPECT_THAT(error({"integrator.type=null"}), EndsWith("`/integrator` needs the key `type`"));
   EXPECT_THAT(error({"field.file=null"}), EndsWith("`/field` needs exactly one of `file` and `generate`"));
   EXPECT_THAT(error({"field.generate.kind=helix"}), EndsWith("`/field` needs exactly one of `file` and `generate`"));
-  EXPECT_THAT(error({"bending.rgb=[1,2,3]", "output.spectral=a.exr"}), HasSubstr("`/output/spectral` needs"));
-  EXPECT_THAT(error({"receiver.center=[0,0,0]", "receiver.distance=1"}), HasSubstr("exclude each other"));
+  refuses("`/output/spectral` needs", {"bending.rgb=[1,2,3]", "output.spectral=a.exr"});
+  refuses("exclude each other", {"receiver.center=[0,0,0]", "receiver.distance=1"});
 }
 
 TEST_F(ReadScene, ChecksAcrossKeys) {
-  EXPECT_THAT(error({"light.wavelengths={\"min\":600,\"max\":500}"}), HasSubstr("`/light/wavelengths/min` (600 nm)"));
-  EXPECT_THAT(error({"light.wavelengths={\"min\":600,\"max\":600}"}),
-              HasSubstr("`/light/wavelengths/count` must be 1"));
+  refuses("`/light/wavelengths/min` (600 nm)", {"light.wavelengths={\"min\":600,\"max\":500}"});
+  refuses("`/light/wavelengths/count` must be 1", {"light.wavelengths={\"min\":600,\"max\":600}"});
   EXPECT_EQ(read({"light.wavelengths={\"min\":600,\"max\":600,\"count\":1}"}).light.wavelength_count, 1);
-  EXPECT_THAT(error({"light.wavelengths.per_photon=5"}), HasSubstr("must divide `count` (32), but is 5"));
-  EXPECT_THAT(error({"light.wavelengths.per_photon=64"}), HasSubstr("must divide"));
+  refuses("must divide `count` (32), but is 5", {"light.wavelengths.per_photon=5"});
+  refuses("must divide", {"light.wavelengths.per_photon=64"});
   EXPECT_EQ(read({"light.wavelengths.per_photon=8"}).light.wavelengths_per_photon, 8);
-  EXPECT_THAT(error({"receiver.normal=[1,0,0]"}), HasSubstr("`/receiver/normal` is perpendicular to the light"));
+  refuses("`/receiver/normal` is perpendicular to the light", {"receiver.normal=[1,0,0]"});
   EXPECT_NO_THROW(read({"receiver.normal=[1,0,0.01]"}));
   EXPECT_NO_THROW(read({"light.up=[0,0,1]"})) << "up along the light has a fallback";
 }
@@ -230,7 +229,7 @@ TEST_F(ReadScene, Spectra) {
   };
   EXPECT_EQ(file_of("blackbody.txt"), folder_ / "blackbody.txt");
   EXPECT_EQ(file_of("/lamps/led"), "/lamps/led");
-  EXPECT_THAT(error({"light.spectrum=d65"}), HasSubstr("`/light/spectrum` must be one of \"D65\""));
+  refuses("`/light/spectrum` must be one of \"D65\"", {"light.spectrum=d65"});
   for (const char* wrong : {"blackbody", "blackbody -1", "blackbody 0", "blackbody hot", "blackbody 5000 K",
                             "blackbody 0x1p12", "blackbody nan", "blackbody inf", "blackbody 1e300"}) {
     EXPECT_THAT(error({std::string("light.spectrum=") + wrong}), HasSubstr("blackbody KELVIN")) << wrong;
@@ -238,8 +237,8 @@ TEST_F(ReadScene, Spectra) {
 }
 
 TEST_F(ReadScene, KeysOfAnotherKindAreRefused) {
-  const auto expect = [this](const Overrides& overrides, const char* pointer) {
-    EXPECT_THAT(error(overrides), AllOf(HasSubstr("`" + std::string(pointer) + "` has a meaning only where")));
+  const auto expect = [this](const Overrides& overrides, const std::string& pointer) {
+    refuses("`" + pointer + "` has a meaning only where", overrides);
   };
   expect({R"(integrator.material={"kind":"metal","clearcoat":1})"}, "/integrator/material/clearcoat");
   expect({R"(integrator.material={"metal":"gold"})"}, "/integrator/material/metal");
@@ -262,13 +261,13 @@ TEST_F(ReadScene, Warnings) {
 
 TEST_F(ReadScene, SyntaxErrorsHaveAPosition) {
   const std::string file = (folder_ / "scene.json").string();
-  EXPECT_THAT(error({}, "{\n  \"seed\": 1,\n  \"field\" {}\n}"), HasSubstr(file + ": line 3, column 11: "));
+  refuses(file + ": line 3, column 11: ", {}, "{\n  \"seed\": 1,\n  \"field\" {}\n}");
   EXPECT_THAT(error({}, "{\n  \"seed\": 1,\n}"),
               AllOf(HasSubstr("line 3, column 1: "), HasSubstr("extra comma before it")));
-  EXPECT_THAT(error({}, "{\"seed\": 1"), HasSubstr("line 1, column 11: "));
-  EXPECT_THAT(error({}, "{\"seed\": 1} x"), HasSubstr("line 1, column 13: "));
-  EXPECT_THAT(error({}, "{\"seed\": 1e999}"), HasSubstr("number overflow"));
-  EXPECT_THAT(error({}, "{\"seed\": 1, \"seed\": 2}"), HasSubstr("key `seed` is given twice"));
+  refuses("line 1, column 11: ", {}, "{\"seed\": 1");
+  refuses("line 1, column 13: ", {}, "{\"seed\": 1} x");
+  refuses("number overflow", {}, "{\"seed\": 1e999}");
+  refuses("key `seed` is given twice", {}, "{\"seed\": 1, \"seed\": 2}");
 }
 
 // The files that scenes name, read and write.
@@ -287,9 +286,9 @@ TEST_F(ReadScene, PathsOfAnyBytesComeBack) {
 }
 
 TEST_F(ReadScene, OutputsNeverOverwriteEachOtherOrAnInput) {
-  EXPECT_THAT(error({"output.exr=a.exr", "output.spectral=./x/../a.exr"}), HasSubstr("same file as `/output/exr`"));
-  EXPECT_THAT(error({"output.photons=a.vdb"}),
-              HasSubstr("`/output/photons` (" + (folder_ / "a.vdb").string() + ") is the same file as `/field/file`"));
+  refuses("same file as `/output/exr`", {"output.exr=a.exr", "output.spectral=./x/../a.exr"});
+  refuses("`/output/photons` (" + (folder_ / "a.vdb").string() + ") is the same file as `/field/file`",
+          {"output.photons=a.vdb"});
   EXPECT_NO_THROW(read({"output.exr=a.exr", "output.spectral=b/a.exr", "output.photons=b.vdb"}));
 }
 
@@ -304,12 +303,9 @@ TEST_F(ReadScene, OutputsOfTheCommandLineTakeThePlaceOfTheScenes) {
   EXPECT_EQ(files_of({"/a.vtp"}, {"integrator.type=path_tracing"}), (Files{{"paths", "/a.vtp"}}));
   EXPECT_EQ(files_of({"/a.vdb"}, {"integrator.type=stretch"}), (Files{{"stretch", "/a.vdb"}}));
   EXPECT_EQ(files_of({"a.png"}), (Files{{"image", fs::absolute("a.png")}}));
-  const auto refusal = [&](const std::vector<fs::path>& outputs, const Overrides& overrides = {}) {
-    return message([&] { files_of(outputs, overrides); });
-  };
-  EXPECT_THAT(refusal({"a.png", "b.jpg"}), HasSubstr("one kind"));
-  EXPECT_THAT(refusal({"a.gif"}), HasSubstr(".png, .jpg"));
-  EXPECT_THAT(refusal({"a.vdb"}, {"integrator.type=lens"}), HasSubstr("lens makes no photons"));
+  EXPECT_THAT(message([&] { files_of({"a.png", "b.jpg"}); }), HasSubstr("one kind"));
+  EXPECT_THAT(message([&] { files_of({"a.gif"}); }), HasSubstr(".png, .jpg"));
+  EXPECT_THAT(message([&] { files_of({"a.vdb"}, {"integrator.type=lens"}); }), HasSubstr("lens makes no photons"));
 }
 
 /// input_files lists every key that names a file, and an output is refused under any name of the same file.
@@ -348,13 +344,9 @@ TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
     const fs::path aside = folder_ / "aside";
     fs::rename(input.path, aside);
     ASSERT_EQ(mkfifo(input.path.c_str(), 0600), 0);
-    std::string refusal;
-    try {
-      check_files(scene, {});
-    } catch (const SceneError& error) {
-      refusal = error.what();
-    }
-    EXPECT_EQ(refusal.find("is a pipe or a device") != std::string::npos, input.path != scene.path) << input.name;
+    EXPECT_THAT(message([&] { check_files(scene, {}); }),
+                HasSubstr(input.path == scene.path ? "nothing was thrown" : "is a pipe or a device"))
+        << input.name;
     fs::remove(input.path);
     fs::rename(aside, input.path);
   }

@@ -1,18 +1,15 @@
 // A scene in another unit of length is the same picture: nothing in a render has a length of its own.
 
-#include <cmath>
 #include <map>
 #include <set>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
 
 #include "base/process/progress.h"
 #include "integrators/methods/read_scene.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
+#include "tests/names.h"
 #include "volumes/making/generators.h"
 
 namespace tensorray {

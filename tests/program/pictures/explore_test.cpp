@@ -17,12 +17,8 @@ class Explore : public Program {
     run_well({"make", "point_load", "-o", "stress.vdb", "--resolution", "9"});
   }
 
-  const std::vector<std::string> few_{"--set", "light.wavelengths.count=4", "-q"};
-
-  Outcome explore(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(), {"explore", "stress.vdb"});
-    arguments.insert(arguments.end(), few_.begin(), few_.end());
-    return run(arguments);
+  Outcome explore(const Arguments& arguments) const {
+    return run(joined({"explore", "stress.vdb", "--set", "light.wavelengths.count=4", "-q"}, arguments));
   }
 };
 
@@ -75,12 +71,12 @@ TEST_F(Explore, RowsOfThePolariscopeAreItsCoefficients) {
 
 /// Several depths of a lens are side by side, and the stretch has pixels of its own.
 TEST_F(Explore, PicturesOfOtherMethodsStayInTheirCells) {
-  for (const std::vector<std::string>& method : std::vector<std::vector<std::string>>{
+  for (const Arguments& method : std::vector<Arguments>{
            {"integrator.type=stretch", "integrator.stretch.pixels=64", "integrator.stretch.resolution=8"},
            {"integrator.type=path_tracing", "integrator.seeds.count=9", "integrator.max_samples=1",
             "integrator.min_samples=1"},
            {"integrator.type=lens", "integrator.image_plane.depth=[0,0.5]", "integrator.mode=gather"}}) {
-    std::vector<std::string> arguments{"-o", "sheet.png", "--size", "32"};
+    Arguments arguments{"-o", "sheet.png", "--size", "32"};
     for (const std::string& change : method) arguments.insert(arguments.end(), {"--set", change});
     const Outcome outcome = explore(arguments);
     ASSERT_EQ(outcome.status, 0) << outcome.error;
@@ -96,7 +92,7 @@ TEST_F(Explore, PicturesOfOtherMethodsStayInTheirCells) {
 }
 
 TEST_F(Explore, WrongOptionsAreRefused) {
-  const std::pair<const char*, std::vector<std::string>> wrong[] = {
+  const std::pair<const char*, Arguments> wrong[] = {
       {"nothing to do", {}},
       {"sheet.exr", {"-o", "sheet.exr"}},
       {"--save-scene", {"-o", "sheet.png", "--pick", "3"}},

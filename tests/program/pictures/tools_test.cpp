@@ -1,6 +1,5 @@
-// tools/clip: makes a clip of the frames of a sequence.
+// Programs beside `tensorray`: tools/clip, tools/gallery and the benchmark.
 
-#include <cstdlib>
 #include <iostream>
 #include <numeric>
 
@@ -11,7 +10,6 @@ namespace tensorray {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 
 class Clip : public Program {
  protected:
@@ -62,6 +60,7 @@ TEST_F(Clip, ErrorsAreOneLine) {
 
 // The pictures of the documentation are those that the commands beside them make: small versions, by tools/gallery, are
 // compared with the pictures.
+
 /// Pictures that are made in a second or two each.
 constexpr const char* quick_pictures = "constant shear hemisphere_lens_top compared/rims_gaussian reading/spread";
 

@@ -1,5 +1,4 @@
-
-#include <fmt/core.h>
+// Sequences of frames, and renders that a queue divides.
 
 #include "renderer/images/image.h"
 #include "tests/program/divided_scenes.h"
@@ -31,9 +30,9 @@ TEST_F(Frames, KeyframesAndNumberedFieldsAreFollowed) {
     run_well({"render", "scene.json", "--set", "light.direction=" + direction, "--set",
               "field.file=load.000" + number + ".vdb", "-o", "alone.exr", "-q"});
     EXPECT_EQ(pixels("out.0" + number + ".exr"), pixels("alone.exr")) << frame;
-    EXPECT_TRUE(exists(in_folder("out.0" + number + ".json")));
+    EXPECT_TRUE(has("out.0" + number + ".json"));
   }
-  EXPECT_FALSE(exists(in_folder("out.02.exr")));
+  EXPECT_FALSE(has("out.02.exr"));
   EXPECT_NE(pixels("out.01.exr"), pixels("out.03.exr"));
   expect_error("load.0002.vdb", {"render", "scene.json", "--frames", "2", "-q"});
 }
@@ -65,16 +64,13 @@ TEST_F(Frames, ExistingFramesAreLeftOutOnRequest) {
 TEST_F(Frames, ABadFrameStopsNoOthersOnRequest) {
   write("scene.json", R"({"field": {"file": "load.####.vdb"})" + rest_);
   run_well({"make", "helix", "-o", "load.0005.vdb", "--resolution", "9"});
-  const std::vector<std::string> arguments{"render", "scene.json", "--frames", "0,1,3-5,2", "-o", "a.%02d.exr", "-q"};
-  const Outcome stopped = run(arguments);
-  EXPECT_EQ(stopped.status, 1);
+  const Arguments arguments{"render", "scene.json", "--frames", "0,1,3-5,2", "-o", "a.%02d.exr", "-q"};
+  EXPECT_EQ(run(arguments).status, 1);
   for (const std::string& name : files()) EXPECT_NE(name[0], 'a') << name;
 
-  std::vector<std::string> going = arguments;
-  going.emplace_back("--keep-going");
-  const Outcome outcome = run(going);
+  const Outcome outcome = run(joined(arguments, {"--keep-going"}));
   EXPECT_EQ(outcome.status, 1);
-  for (const char* frame : {"01", "03", "05"}) EXPECT_TRUE(exists(in_folder("a." + std::string(frame) + ".exr")));
+  for (const std::string frame : {"01", "03", "05"}) EXPECT_TRUE(has("a." + frame + ".exr"));
   for (const char* line : {"tensorray: frame 0: ", "tensorray: frame 4: ", "tensorray: frame 2: ",
                            "tensorray: 3 frames failed: 0, 4, 2; render again with --frames 0,4,2"})
     EXPECT_NE(outcome.error.find(line), std::string::npos) << line << outcome.error;
@@ -103,13 +99,9 @@ TEST_F(Frames, MistakesAreNamed) {
   expect_error("each frame would replace it", {"render", "scene.json", "--frames", "1-2", "-o", "one.exr"});
   expect_error("s.json", {"render", "scene.json", "--frames", "1-2", "-o", "a.#.exr", "--stats", "s.json"});
   expect_error("--frames 2-1", {"render", "scene.json", "--frames", "2-1"});
-  for (const char* name : {"a.%04d.exr", "a.$F4.exr"})
-    for (const std::vector<std::string>& option :
-         {std::vector<std::string>{"-o", name}, {"--set", std::string("output.exr=") + name}, {"--stats", name}}) {
-      std::vector<std::string> arguments{"render", "scene.json", "--set", "light.direction=[0,0,-1]"};
-      arguments.insert(arguments.end(), option.begin(), option.end());
-      expect_error("has the number of a frame; give --frames", arguments);
-    }
+  for (const Arguments& option : {Arguments{"-o", "a.%04d.exr"}, {"--set", "output.exr=a.$F4.exr"}, {"--stats", "$F"}})
+    expect_error("has the number of a frame; give --frames",
+                 joined({"render", "scene.json", "--set", "light.direction=[0,0,-1]"}, option));
   expect_error("--save-scene", {"render", "scene.json", "--frames", "1-2", "--save-scene", "copy.json"});
   EXPECT_FALSE(has("one.exr"));
   const pid_t piped = start_in("cat scene.json |", {"render", "/dev/stdin", "--frames", "1-2", "-o", "a.#.exr"});
@@ -117,6 +109,7 @@ TEST_F(Frames, MistakesAreNamed) {
 }
 
 // tools/render_array, with programs in the PATH that stand for those of queues, and run their tasks at once.
+
 /// Keeps its options in a file, and copies the script, as Slurm does.
 constexpr const char* sbatch = R"(#!/bin/bash
 echo "$*" >>queue.log

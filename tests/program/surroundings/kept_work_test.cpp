@@ -1,6 +1,5 @@
 // Renders that are killed, interrupted, continued and divided: the files are always those of one render.
 
-#include <fmt/core.h>
 #include <sys/stat.h>
 
 #include "scenes/jobs/work_file.h"
@@ -15,8 +14,10 @@ class KeptWork : public Program {
   void SetUp() override {
     Program::SetUp();
     run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "17"});
-    make(path_scene);
+    make(scene());
   }
+
+  virtual std::string scene() const { return path_scene; }
 
   /// Makes the scene and the files of one render.
   void make(const std::string& scene) const {
@@ -24,10 +25,14 @@ class KeptWork : public Program {
     run_well(render("whole"));
   }
 
-  static std::vector<std::string> render(const std::string& name, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments{"render", "scene.json", "-q", "-o", name + ".png", "-o", name + ".exr"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
+  static Arguments render(const std::string& name, const Arguments& more = {}) {
+    return joined({"render", "scene.json", "-q", "-o", name + ".png", "-o", name + ".exr"}, more);
+  }
+
+  /// What a render of a.png and a.exr says.
+  std::string said(Arguments arguments) const {
+    arguments.erase(std::find(arguments.begin(), arguments.end(), "-q"));
+    return run_well(arguments).error;
   }
 
   /// The number of a file on its disk; 0 if there is none. A file that is replaced has another one.
@@ -37,7 +42,7 @@ class KeptWork : public Program {
   }
 
   /// Starts a render and waits until it has written a file, or has ended. @return the process.
-  pid_t start_until(const std::string& file, const std::vector<std::string>& arguments) const {
+  pid_t start_until(const std::string& file, const Arguments& arguments) const {
     const ino_t before = number_of(file);
     const pid_t child = start(arguments);
     while (number_of(file) == before && is_running(child)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -47,7 +52,7 @@ class KeptWork : public Program {
   /// A run that a signal ends as soon as it has written a file. A run that was quicker than the signal (it ended, or
   /// had written its whole picture already) is tried again, as often as it takes: what is tested does not depend on the
   /// machine's speed.
-  Outcome end_by(int signal, const std::string& file, const std::vector<std::string>& arguments) const {
+  Outcome end_by(int signal, const std::string& file, const Arguments& arguments) const {
     while (true) {
       const pid_t child = start_until(file, arguments);
       kill(child, signal);
@@ -59,11 +64,9 @@ class KeptWork : public Program {
   }
 
   /// The same for a render of the pictures a.*, of which none is there before it.
-  Outcome end_by(int signal, const std::vector<std::string>& more = {}) const {
+  Outcome end_by(int signal, const Arguments& more = {}) const {
     for (const char* picture : {"a.png", "a.exr"}) std::filesystem::remove(in_folder(picture));
-    std::vector<std::string> arguments = render("a", more);
-    arguments.insert(arguments.end(), {"--checkpoint", "0.01"});
-    return end_by(signal, "a.png.checkpoint", arguments);
+    return end_by(signal, "a.png.checkpoint", joined(render("a", more), {"--checkpoint", "0.01"}));
   }
 
   /// Asks a render for a picture while it runs. A render that was quicker is tried again.
@@ -84,6 +87,14 @@ class KeptWork : public Program {
       EXPECT_TRUE(is_equal(name + ending, "whole" + std::string(ending))) << ending;
   }
 
+  /// The checkpoint with results of another size, whose hash is right.
+  std::string forged() const {
+    WorkFile work = read_work(in_folder("a.png.checkpoint"));
+    for (auto& [name, result] : work.results) result = std::make_shared<const std::string>("of another size");
+    write_work(in_folder("forged"), work);
+    return read_file(in_folder("forged"));
+  }
+
   void make_shards(int count) const {
     for (int i = 1; i <= count; ++i)
       run_well({"render", "scene.json", "-q", "--shard", fmt::format("{}/{}", i, count), "-o", shard(i)});
@@ -91,26 +102,24 @@ class KeptWork : public Program {
 
   static std::string shard(int i) { return fmt::format("{}.shard", i); }
 
-  static std::vector<std::string> merge(std::vector<std::string> shards) {
-    shards.insert(shards.begin(), {"merge", "-q", "-o", "a.png", "-o", "a.exr"});
-    return shards;
+  static Arguments merge(const Arguments& shards) {
+    return joined({"merge", "-q", "-o", "a.png", "-o", "a.exr"}, shards);
   }
 };
 
 /// Each method: tiles and the light before them, sums of photons, flow maps, rows; parts of a plate that are refined.
-class DividedWork : public KeptWork, public testing::WithParamInterface<std::string> {};
+class DividedWork : public KeptWork, public testing::WithParamInterface<std::string> {
+  std::string scene() const override { return GetParam(); }
+};
 
 TEST_P(DividedWork, ThatIsKilledContinuesToTheSameFiles) {
-  make(GetParam());
-  EXPECT_EQ(end_by(SIGKILL, {"--threads", "1"}).status, 128 + SIGKILL);
-  EXPECT_EQ(end_by(SIGKILL, {"--threads", "1"}).status, 128 + SIGKILL);
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(end_by(SIGKILL, {"--threads", "1"}).status, 128 + SIGKILL);
   run_well(render("a", {"--resume"}));
   expect_same("a");
   EXPECT_FALSE(has("a.png.checkpoint"));
 }
 
 TEST_P(DividedWork, IsTheSameOnAnyNumberOfThreads) {
-  make(GetParam());
   for (const char* threads : {"1", "7"}) {
     run_well(render("a", {"--threads", threads}));
     expect_same("a");
@@ -118,7 +127,6 @@ TEST_P(DividedWork, IsTheSameOnAnyNumberOfThreads) {
 }
 
 TEST_P(DividedWork, OfShardsMergesToTheSameFiles) {
-  make(GetParam());
   make_shards(3);
   run_well(merge({"3.shard", "1.shard", "2.shard"}));
   expect_same("a");
@@ -134,23 +142,21 @@ TEST_F(KeptWork, AShardThatIsKilledContinues) {
   make(lit_scene);
   make_shards(2);
   const std::string whole = read_file(in_folder(shard(2)));
-  std::vector<std::string> part{"render", "scene.json",   "-q",   "--shard",   "2/2", "-o",
-                                shard(2), "--checkpoint", "0.01", "--threads", "1"};
+  const Arguments part{"render", "scene.json",   "-q",   "--shard",   "2/2", "-o",
+                       shard(2), "--checkpoint", "0.01", "--threads", "1"};
   std::filesystem::remove(in_folder(shard(2)));
   EXPECT_EQ(end_by(SIGKILL, shard(2) + ".checkpoint", part).status, 128 + SIGKILL);
-  part.emplace_back("--resume");
-  run_well(part);
+  run_well(joined(part, {"--resume"}));
   EXPECT_TRUE(read_file(in_folder(shard(2))) == whole);
 }
 
 /// The first shard has it; others may take it from there, and merge does.
 TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
   make(lit_scene);
-  const auto make_shard = [](int i, const std::vector<std::string>& more) {
-    std::vector<std::string> arguments{"render",  "scene.json",           "-q", "--checkpoint", "0.01",
-                                       "--shard", fmt::format("{}/3", i), "-o", shard(i)};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
+  const auto make_shard = [](int i, const Arguments& more) {
+    return joined(
+        {"render", "scene.json", "-q", "--checkpoint", "0.01", "--shard", fmt::format("{}/3", i), "-o", shard(i)},
+        more);
   };
   run_well(make_shard(1, {}));
   run_well(make_shard(2, {"--light", shard(1)}));
@@ -161,11 +167,7 @@ TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
   expect_same("a");
   expect_error("of another render", make_shard(3, {"--light", shard(1), "--seed", "7"}));
   expect_error("is the same file as --light", make_shard(3, {"--light", shard(3)}));
-  std::vector<std::string> loud = make_shard(3, {"--light", shard(2)});
-  loud.erase(std::find(loud.begin(), loud.end(), "-q"));
-  const Outcome outcome = run(loud);
-  EXPECT_EQ(outcome.status, 0);
-  EXPECT_NE(outcome.error.find("2.shard has no light"), std::string::npos) << outcome.error;
+  EXPECT_THAT(said(make_shard(3, {"--light", shard(2)})), HasSubstr("2.shard has no light"));
   expect_error("none.shard", make_shard(3, {"--light", "none.shard"}), 1);
 }
 
@@ -191,34 +193,23 @@ TEST_F(KeptWork, ARequestWritesAPictureAndTheRenderGoesOn) {
 
 /// The same scene continues by itself and says so in one line; that of another scene stays under another name.
 TEST_F(KeptWork, ACheckpointIsContinuedOrSetAside) {
-  const auto loud = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> arguments = render("a", more);
-    arguments.erase(std::find(arguments.begin(), arguments.end(), "-q"));
-    const Outcome outcome = run(arguments);
-    EXPECT_EQ(outcome.status, 0) << outcome.error;
-    return outcome.error;
-  };
   end_by(SIGKILL);
   const std::string kept = read_file(in_folder("a.png.checkpoint"));
-  EXPECT_NE(loud({}).find("/a.png.checkpoint\n"), std::string::npos);
+  EXPECT_THAT(said(render("a")), HasSubstr("/a.png.checkpoint\n"));
   expect_same("a");
   EXPECT_FALSE(has("a.png.checkpoint"));
-  EXPECT_EQ(loud({}).find("checkpoint"), std::string::npos);
+  EXPECT_THAT(said(render("a")), Not(HasSubstr("checkpoint")));
   for (const char* name : {"a.png.checkpoint.1", "a.png.checkpoint.2"}) {
     write("a.png.checkpoint", kept);
-    const std::string said = loud({"--seed", "7"});
-    EXPECT_NE(said.find("`/seed` is not given there, 7 here; it is kept as " + in_folder(name).string()),
-              std::string::npos)
-        << said;
+    EXPECT_THAT(said(render("a", {"--seed", "7"})),
+                HasSubstr("`/seed` is not given there, 7 here; it is kept as " + in_folder(name).string()));
     EXPECT_FALSE(is_equal("a.exr", "whole.exr"));
     EXPECT_TRUE(read_file(in_folder(name)) == kept);
   }
-  WorkFile forged = read_work(in_folder("a.png.checkpoint.1"));
-  for (auto& [name, result] : forged.results) result = std::make_shared<const std::string>("of another size");
-  for (const std::string& bytes : {std::string("no checkpoint"), kept.substr(0, kept.size() / 2), std::string()}) {
+  write("a.png.checkpoint", kept);
+  for (const std::string& bytes : {std::string("no checkpoint"), kept.substr(0, kept.size() / 2), forged()}) {
     write("a.png.checkpoint", bytes);
-    if (bytes.empty()) write_work(in_folder("a.png.checkpoint"), forged);
-    EXPECT_NE(loud({}).find("it is kept as "), std::string::npos);
+    EXPECT_THAT(said(render("a")), HasSubstr("it is kept as "));
     expect_same("a");
   }
 }
@@ -243,21 +234,17 @@ TEST_F(KeptWork, ACheckpointOfAnotherRenderIsRefusedWhereItMustBeContinued) {
   run_well({"make", "vortex", "-o", "field.vdb", "--resolution", "17"});
   expect_error("the file `/field/file` has other contents", render("a", {"--resume"}));
   write("field.vdb", field);
-  WorkFile forged = read_work(in_folder("a.png.checkpoint"));  // Whose hash is right.
-  for (auto& [name, result] : forged.results) result = std::make_shared<const std::string>("of another size");
-  write_work(in_folder("a.png.checkpoint"), forged);
+  write("a.png.checkpoint", forged());
   expect_error("a.png.checkpoint: ", render("a", {"--resume"}), 1);
   write("a.png.checkpoint", kept);
   run_well(render("a", {"--resume"}));
   expect_same("a");
 }
 
-/// The render goes on, and the old checkpoint stays.
 TEST_F(KeptWork, AFullDiskLeavesTheOldCheckpoint) {
   end_by(SIGKILL);
   const std::string kept = read_file(in_folder("a.png.checkpoint"));
-  std::vector<std::string> arguments = render("a", {"--resume", "--checkpoint", "0.01"});
-  const Outcome outcome = run(arguments, 4);
+  const Outcome outcome = run_with_blocks(4, render("a", {"--resume", "--checkpoint", "0.01"}));
   EXPECT_EQ(outcome.status, 1) << outcome.error;  // There is no room for the picture, either.
   EXPECT_NE(outcome.error.find("warning: no checkpoint"), std::string::npos) << outcome.error;
   EXPECT_TRUE(read_file(in_folder("a.png.checkpoint")) == kept);
@@ -286,7 +273,7 @@ TEST_F(KeptWork, ShardsThatDoNotFitAreNamed) {
 /// As other outputs do: a link stays, a device is written to, and no file is that of the checkpoint.
 TEST_F(KeptWork, AShardIsAnOutputLikeOthers) {
   const auto make_shard = [](const std::string& file) {
-    return std::vector<std::string>{"render", "scene.json", "-q", "--shard", "1/2", "-o", file};
+    return Arguments{"render", "scene.json", "-q", "--shard", "1/2", "-o", file};
   };
   std::filesystem::create_symlink("1.shard", in_folder("link"));
   run_well(make_shard("link"));
@@ -299,20 +286,14 @@ TEST_F(KeptWork, AShardIsAnOutputLikeOthers) {
   write("2.shard.new", "somebody's");
   run_well(make_shard("2.shard"));
   EXPECT_EQ(read_file(in_folder("2.shard.new")), "somebody's");
-  std::vector<std::string> arguments = make_shard("3.shard");
-  arguments.insert(arguments.end(), {"--stats", "3.shard.checkpoint"});
-  expect_error("the checkpoint", arguments);
+  expect_error("the checkpoint", joined(make_shard("3.shard"), {"--stats", "3.shard.checkpoint"}));
   expect_error("the checkpoint", render("a", {"--stats", "a.png.checkpoint"}));
 }
 
 /// A frame that was interrupted has files, which are not its picture.
 TEST_F(KeptWork, ASequenceContinuesAtTheFrameThatWasInterrupted) {
-  const std::vector<std::string> turn{"--set", R"(camera.angle={"keys":[[1,20],[3,30]]})"};
-  const auto frames = [&](const std::string& name, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = render(name + ".#", turn);
-    arguments.insert(arguments.end(), {"--frames", "1-3"});
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
+  const auto frames = [&](const std::string& name, const Arguments& more = {}) {
+    return joined(render(name + ".#", {"--set", R"(camera.angle={"keys":[[1,20],[3,30]]})", "--frames", "1-3"}), more);
   };
   run_well(frames("all"));
   EXPECT_EQ(end_by(SIGINT, "a.2.png.checkpoint", frames("a", {"--checkpoint", "0.01"})).status, 130);

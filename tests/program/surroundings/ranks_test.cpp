@@ -1,9 +1,7 @@
 // `mpirun -n 4 tensorray render`: the files are those of one process, whatever happens.
 
-#include <cstdlib>
 #include <optional>
 
-#include <fmt/core.h>
 #include <sys/stat.h>
 
 #include "tests/program/divided_scenes.h"
@@ -86,7 +84,6 @@ TEST_F(RanksProgram, GiveTheFilesOfOneProcess) {
       {plate_scene(gaussian_photons), {"exr"}, 1},  // This one does not load MPI.
       {plate_under_paths("gaussian"), {"exr", "vtp", "ply"}, 2},
       {plate_scene(R"({"type": "photon_distribution"})"), {"png", "exr", "spectral.exr", "vtp", "fluence.vdb"}, 3},
-      {plate_scene(gaussian_photons, 200000), {"exr", "fluence.vdb"}, 3},  // Several chunks.
       {plate_scene(lens), {"png", "exr", "spectral.exr"}, 2},
       {plate_scene(stretch), {"exr", "vdb"}, 2},
       {plate_scene(polariscope), {"exr", "spectral.exr"}, 2},
@@ -94,7 +91,7 @@ TEST_F(RanksProgram, GiveTheFilesOfOneProcess) {
   for (const RankCase& each : cases) {
     SCOPED_TRACE(each.scene);
     write("scene.json", each.scene);
-    std::vector<std::string> alone{"render", "scene.json", "-q", "--stats", "one.json"};
+    Arguments alone{"render", "scene.json", "-q", "--stats", "one.json"};
     std::string together = "-q --threads 1 --stats a.json";
     for (const std::string& ending : each.endings) {
       alone.insert(alone.end(), {"-o", "one." + ending});
@@ -153,10 +150,7 @@ TEST_F(RanksProgram, AKilledRankEndsTheJobWhichContinuesToTheSameFiles) {
 TEST_F(RanksProgram, ErrorsOfASceneAreSaidOnce) {
   write("scene.json", R"({"field": {"file": "none.vdb"}, "integrator": {"type": "lens"}})");
   EXPECT_NE(wait_for_ranks(start_ranks(3, "-o a.png")), 0);
-  const std::string text = error();
-  const std::size_t first = text.find("none.vdb");
-  EXPECT_NE(first, std::string::npos) << text;
-  EXPECT_EQ(text.find("none.vdb", first + 1), std::string::npos) << text;
+  EXPECT_THAT(error(), AllOf(HasSubstr("none.vdb"), Not(testing::ContainsRegex("none.vdb(.|\n)*none.vdb"))));
 }
 
 }  // namespace

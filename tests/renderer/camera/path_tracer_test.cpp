@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <cstring>
 #include <numeric>
 #include <thread>
 #include <utility>
@@ -13,62 +12,30 @@
 #include "base/process/job.h"
 #include "renderer/meshes/mesh.h"
 #include "renderer/sampling/random.h"
-#include "tests/renderer/shapes.h"
-#include "tests/renderer/statistics.h"
+#include "tests/renderer/lit_world.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {
 namespace {
 
 /// Three bands whose colours are red, green and blue.
-std::vector<Band> rgb_bands() {
-  return {
-      {610, 80, 0.3, Vector3d(1, 0.3, 0)}, {545, 80, 0.4, Vector3d(0, 0.6, 0)}, {460, 80, 0.3, Vector3d(0, 0.1, 1)}};
+const TestBands& rgb() {
+  static const TestBands bands = [] {
+    const std::vector<Band> all{
+        {610, 80, 0.3, Vector3d(1, 0.3, 0)}, {545, 80, 0.4, Vector3d(0, 0.6, 0)}, {460, 80, 0.3, Vector3d(0, 0.1, 1)}};
+    Matrix3d to_xyz;
+    for (int i = 0; i < 3; ++i) to_xyz.col(i) = all[static_cast<std::size_t>(i)].xyz;
+    return TestBands(all, to_xyz.inverse());
+  }();
+  return bands;
 }
 
-Eigen::Matrix3d xyz_to_rgb() {
-  Eigen::Matrix3d columns;
-  for (int i = 0; i < 3; ++i) columns.col(i) = rgb_bands()[i].xyz;
-  return columns.inverse();
-}
-
-const ReflectanceTable& colors() {
-  static const ReflectanceTable table(ReflectanceModel(rgb_bands(), xyz_to_rgb()), rgb_bands(), xyz_to_rgb());
-  return table;
-}
-
-BandValues grey(double value) { return BandValues::Constant(3, value); }
-std::vector<float> even(float value) { return std::vector<float>(3, value); }
+BandValues grey(double value) { return rgb().grey(value); }
+std::vector<float> even(float value) { return rgb().even(value); }
 
 RoughConductor mirror(double roughness) { return {roughness, {BandValues::Zero(3), BandValues::Ones(3)}}; }
 
 TriangleMesh floor_mesh(double size) { return rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {size, size}); }
-
-/// A scene and the objects that it refers to.
-struct World {
-  World(std::vector<ShadedSurface> parts, std::vector<Material> materials_, const std::vector<Light>& lights_)
-      : surfaces(std::move(parts)),
-        materials(std::move(materials_)),
-        lights(lights_, {0.3f, 0.6f, 0.1f}, surfaces.bounds()),
-        scene{surfaces, materials, lights, colors()} {}
-
-  SurfaceScene surfaces;
-  std::vector<Material> materials;
-  LightSampler lights;
-  ShadedScene scene;
-};
-
-/// The radiance in the first band, averaged over rays from `from` to `to`.
-Mean seen(const World& world, const ShadingSettings& settings, const Vector3d& from, const Vector3d& to, int samples) {
-  RayShader shader(world.scene, settings);
-  Mean mean;
-  for (int i = 0; i < samples; ++i) {
-    // Each ray has its own pixel, so that samples are independent and the error estimate is valid.
-    shader.shade({{from, (to - from).normalized(), {11, static_cast<std::uint64_t>(i), 0, 0}}}, true);
-    mean.add(shader.radiance(0)[0]);
-  }
-  return mean;
-}
 
 /// Deep enough for all light; without noise from Russian roulette at the first bounces.
 ShadingSettings deep() {
@@ -88,10 +55,10 @@ TEST(FurnaceTest, WhiteThingsInAWhiteSkyCannotBeSeen) {
     // A coarse sphere with smooth normals on a floor, for interreflection and silhouettes.
     ShadedSurface coarse = sphere(8);
     TriangleMesh ground = rectangle_mesh({0, 0, -1.1}, {1, 0, 0}, {0, 1, 0}, {6, 6});
-    const World world({coarse, surface_of(ground, 1)}, {material, make_material(Diffuse{}, grey(1))},
+    const World world(rgb(), {coarse, surface_of(ground, 1)}, {material, make_material(Diffuse{}, grey(1))},
                       {ConstantLight{even(1)}});
     for (const Vector3d& target : {Vector3d(0, 0, 0), Vector3d(0.7, 0, 0.65), Vector3d(0.6, -0.5, -0.9)}) {
-      const Mean mean = seen(world, deep(), {0.3, -4, 1}, target, 1500);
+      const Mean mean = seen(world.scene, deep(), {0.3, -4, 1}, target, 1500);
       // White materials return all light up to 2e-3 per bounce; glass up to 1e-2 near the horizon.
       EXPECT_NEAR(mean.mean(), 1, 4 * mean.error() + (name == "glass" ? 0.03 : 0.01)) << name << target.transpose();
       EXPECT_LT(mean.error(), 0.03) << name;
@@ -110,19 +77,19 @@ TEST(FurnaceTest, GreyBoxHasTheGeometricSeries) {
   // In a closed box of reflectance ρ whose walls emit radiance e, the radiance is e / (1 − ρ) everywhere.
   const TriangleMesh box = room({Vector3d(-1, -1, -1), Vector3d(1, 2, 1)});
   AreaLight light{box, even(0.5f)};
-  const World world({surface_of(box, 0, 0)}, {make_material(Diffuse{}, grey(0.6))}, {light});
+  const World world(rgb(), {surface_of(box, 0, 0)}, {make_material(Diffuse{}, grey(0.6))}, {light});
   for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material}) {
     ShadingSettings settings = deep();
     settings.direct = direct;
     settings.indirect_clamp = 0;
-    const Mean mean = seen(world, settings, {0.2, 0.1, 0.3}, {1, 0.7, 0.2}, 3000);
+    const Mean mean = seen(world.scene, settings, {0.2, 0.1, 0.3}, {1, 0.7, 0.2}, 3000);
     EXPECT_NEAR(mean.mean(), 0.5 / 0.4, 4 * mean.error());
     // Sampling only lights makes noise in the corners.
     EXPECT_LT(mean.error(), direct == DirectLight::lights ? 0.1 : 0.02);
   }
   ShadingSettings twice;
   twice.max_depth = 2;
-  const Mean mean = seen(world, twice, {0.2, 0.1, 0.3}, {1, 0.7, 0.2}, 3000);
+  const Mean mean = seen(world.scene, twice, {0.2, 0.1, 0.3}, {1, 0.7, 0.2}, 3000);
   EXPECT_NEAR(mean.mean(), 0.5 * (1 + 0.6 + 0.36), 4 * mean.error());
 }
 
@@ -130,12 +97,12 @@ TEST(DirectLightTest, OcclusionHidesWhatIsBehind) {
   const AreaLight lamp{rectangle_mesh({0, 0, 3}, {1, 0, 0}, {0, -1, 0}, {1, 1}), even(1)};
   // The plate hides the half of the lamp with x > 0 from the origin.
   const TriangleMesh plate = rectangle_mesh({1, 0, 1.5}, {1, 0, 0}, {0, 1, 0}, {2, 4});
-  const World world({surface_of(floor_mesh(10)), surface_of(lamp.mesh, 0, 0), surface_of(plate)},
+  const World world(rgb(), {surface_of(floor_mesh(10)), surface_of(lamp.mesh, 0, 0), surface_of(plate)},
                     {make_material(Diffuse{}, grey(1))}, {lamp});
   ShadingSettings settings;
   settings.max_depth = 1;
   const std::vector<Vector3d> half{{-0.5, -0.5, 3}, {0, -0.5, 3}, {0, 0.5, 3}, {-0.5, 0.5, 3}};
-  const Mean mean = seen(world, settings, {-2, -1, 0.5}, {0, 0, 0}, 4000);
+  const Mean mean = seen(world.scene, settings, {-2, -1, 0.5}, {0, 0, 0}, 4000);
   EXPECT_NEAR(mean.mean(), polygon_irradiance(half, {0, 0, 0}, {0, 0, 1}) / pi, 4 * mean.error());
 }
 
@@ -144,7 +111,7 @@ TEST(MultipleImportanceSamplingTest, HasTheMeanOfEachStrategy) {
   const AreaLight large{rectangle_mesh({-2, 0, 1.5}, {0, 1, 0}, {0, 0, 1}, {3, 2.9}), even(1)};
   for (const double roughness : {0.3, 0.6}) {
     const World world(
-        {surface_of(floor_mesh(8)), surface_of(small.mesh, 1, 0), surface_of(large.mesh, 1, 1)},
+        rgb(), {surface_of(floor_mesh(8)), surface_of(small.mesh, 1, 0), surface_of(large.mesh, 1, 1)},
         {make_material(Principled{0.3, roughness, 0.5, 0.5, 0.3}, grey(0.6)), make_material(Diffuse{}, grey(0.5))},
         {small, large, ConstantLight{even(0.2f)}});
     ShadingSettings settings;
@@ -152,7 +119,7 @@ TEST(MultipleImportanceSamplingTest, HasTheMeanOfEachStrategy) {
     settings.indirect_clamp = 0;
     const auto mean_of = [&](DirectLight direct) {
       settings.direct = direct;
-      return seen(world, settings, {0.4, -2.5, 1.6}, {0.1, -0.6, 0}, 12000);
+      return seen(world.scene, settings, {0.4, -2.5, 1.6}, {0.1, -0.6, 0}, 12000);
     };
     const Mean both = mean_of(DirectLight::both);
     for (const DirectLight direct : {DirectLight::lights, DirectLight::material}) {
@@ -167,7 +134,8 @@ TEST(MultipleImportanceSamplingTest, HasTheMeanOfEachStrategy) {
 TEST(ShadingNormalTest, SmoothSpheresHaveNoFringesAndDoNotLeak) {
   // The sun is behind the viewer, then beside. The shading of a Lambertian sphere follows the smooth normal.
   for (const Vector3d& travels : {Vector3d(0, 1, 0), Vector3d(1, 0.2, 0)}) {
-    const World world({sphere(10)}, {make_material(Diffuse{}, grey(1))}, {DirectionalLight{travels, even(1), 0}});
+    const World world(rgb(), {sphere(10)}, {make_material(Diffuse{}, grey(1))},
+                      {DirectionalLight{travels, even(1), 0}});
     ShadingSettings settings;
     settings.max_depth = 1;
     RayShader shader(world.scene, settings);
@@ -187,23 +155,23 @@ TEST(AmbientOcclusionTest, HasItsClosedForms) {
   ShadingSettings settings;
   settings.shading = Shading::ambient_occlusion;
   const Material material = make_material(Diffuse{}, grey(0.8));
-  const World plane({surface_of(floor_mesh(4))}, {material}, {});
-  EXPECT_NEAR(seen(plane, settings, {0, -3, 1}, {0, 0, 0}, 100).mean(), 0.8, 1e-12);
+  const World plane(rgb(), {surface_of(floor_mesh(4))}, {material}, {});
+  EXPECT_NEAR(seen(plane.scene, settings, {0, -3, 1}, {0, 0, 0}, 100).mean(), 0.8, 1e-12);
 
   // A high wall hides half of the sky from its foot. At a distance it hides (1 − cos θ) / 2, where θ is the elevation
   // of its upper edge.
   const TriangleMesh wall = rectangle_mesh({0, 1, 1}, {1, 0, 0}, {0, 0, 1}, {4000, 2});
-  const World corner({surface_of(floor_mesh(4)), surface_of(wall)}, {material}, {});
-  const Mean mean = seen(corner, settings, {0, -3, 1}, {0, 0, 0}, 4000);
+  const World corner(rgb(), {surface_of(floor_mesh(4)), surface_of(wall)}, {material}, {});
+  const Mean mean = seen(corner.scene, settings, {0, -3, 1}, {0, 0, 0}, 4000);
   EXPECT_NEAR(mean.mean(), 0.8 * (1 - (1 - std::sqrt(0.2)) / 2), 4 * mean.error() + 1e-3);
 }
 
 TEST(HeadlightTest, IsTheCosineToTheViewer) {
   ShadingSettings settings;
   settings.shading = Shading::headlight;
-  const World plane({surface_of(floor_mesh(4))}, {make_material(Diffuse{}, grey(0.8))}, {});
-  EXPECT_NEAR(seen(plane, settings, {0, -3, 4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
-  EXPECT_NEAR(seen(plane, settings, {0, -3, -4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
+  const World plane(rgb(), {surface_of(floor_mesh(4))}, {make_material(Diffuse{}, grey(0.8))}, {});
+  EXPECT_NEAR(seen(plane.scene, settings, {0, -3, 4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
+  EXPECT_NEAR(seen(plane.scene, settings, {0, -3, -4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
 }
 
 /// A sphere with data on a floor, lit by a lamp and a dim sky.
@@ -219,7 +187,7 @@ World still_life() {
   const AreaLight lamp{rectangle_mesh({2, -2, 4}, {1, 0, 0}, {0, -1, 0}, {1.5, 1.5}), even(6)};
   TriangleMesh ground = floor_mesh(10);
   for (Vector3d& p : ground.vertices) p.z() = -1;
-  return World({ball, surface_of(ground, 1), surface_of(lamp.mesh, 1, 0)},
+  return World(rgb(), {ball, surface_of(ground, 1), surface_of(lamp.mesh, 1, 0)},
                {make_material(Principled{}, grey(0.5)), make_material(Diffuse{}, grey(0.5))},
                {lamp, ConstantLight{even(0.3f)}});
 }
@@ -288,7 +256,6 @@ TEST(PictureTest, KeepsBandsWhereTheyAreWanted) {
   EXPECT_LT(sizes[0] + 20 * 20 * 3 * 4, sizes[1]);  // Three bands.
 }
 
-/// Within a tile: it stays as it was.
 TEST(PictureTest, IsCancelledWithinATile) {
   const World world = still_life();
   PathTracerSettings settings;
@@ -389,16 +356,16 @@ TEST(PictureTest, WhatIsMissingIsNamed) {
   const auto error = [&](const World& world, const PathTracerSettings& settings) {
     return message([&] { render_surfaces(world.scene, camera(4), settings); });
   };
-  EXPECT_EQ(error(World({surface_of(floor_mesh(1), 1)}, {material}, {}), {}), "surface 0 has no material");
-  EXPECT_EQ(error(World({surface_of(floor_mesh(1))}, {material}, {lamp}), {}),
+  EXPECT_EQ(error(World(rgb(), {surface_of(floor_mesh(1), 1)}, {material}, {}), {}), "surface 0 has no material");
+  EXPECT_EQ(error(World(rgb(), {surface_of(floor_mesh(1))}, {material}, {lamp}), {}),
             "light 0 must have a surface of its mesh");
-  EXPECT_EQ(error(World({surface_of(floor_mesh(1), 0, 1)}, {material}, {lamp}), {}),
+  EXPECT_EQ(error(World(rgb(), {surface_of(floor_mesh(1), 0, 1)}, {material}, {lamp}), {}),
             "surface 0 must be that of an area light");
-  EXPECT_EQ(error(World({}, {make_material(Diffuse{}, BandValues::Ones(2))}, {}), {}),
+  EXPECT_EQ(error(World(rgb(), {}, {make_material(Diffuse{}, BandValues::Ones(2))}, {}), {}),
             "material 0 must have a reflectance for each band of the light");
   PathTracerSettings settings;
   settings.max_samples = 8;
-  EXPECT_EQ(error(World({}, {}, {}), settings), "max_samples must be >= min_samples");
+  EXPECT_EQ(error(World(rgb(), {}, {}, {}), settings), "max_samples must be >= min_samples");
 }
 
 }  // namespace

@@ -50,12 +50,9 @@ TEST(AnnotationsTest, ScaleBarHasItsLength) {
 
 /// A caption ends at the margin, on its base line, and changes nothing left of its width.
 TEST(AnnotationsTest, CaptionIsInTheLowerRightCorner) {
-  Image image(300, 200, {"R", "G", "B"});
+  Image image = blank(300, 200, 0);
   draw_caption(image, "scale 7");
-  Eigen::AlignedBox2i ink;
-  for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x)
-      if (image.pixel(x, y)[0] > 0.5f) ink.extend(Eigen::Vector2i(x, y));
+  const Eigen::AlignedBox2i ink = drawn_box(image, 0);
   const double letter = 13;
   EXPECT_NEAR(ink.max().x(), 300 - letter, 3);
   EXPECT_NEAR(ink.max().y(), 200 - letter, 2);
@@ -65,17 +62,16 @@ TEST(AnnotationsTest, CaptionIsInTheLowerRightCorner) {
 
 /// Axes of a plate lie along its right and up; an axis that points at the viewer is no line.
 TEST(AnnotationsTest, AxesPointAsThePictureShowsThem) {
-  const auto extent = [](const Eigen::Vector3d& right, const Eigen::Vector3d& up) {
+  const auto axes = [](const Eigen::Vector3d& right, const Eigen::Vector3d& up) {
     Image image = blank(400, 400, 0);
     draw_axes(image, right, up);
     return image;
   };
-  // x to the right and y upwards, or y to the right and z upwards: the lines are the same, the letters are not.
-  EXPECT_NE(extent({1, 0, 0}, {0, 1, 0}).pixels, extent({0, 1, 0}, {0, 0, 1}).pixels);
-  // Seen from behind: a cross instead of a dot, and x to the left.
-  EXPECT_NE(extent({1, 0, 0}, {0, 1, 0}).pixels, extent({-1, 0, 0}, {0, 1, 0}).pixels);
+  const Image x_and_y = axes({1, 0, 0}, {0, 1, 0});
+  EXPECT_NE(x_and_y.pixels, axes({0, 1, 0}, {0, 0, 1}).pixels);   // Other letters at the same lines.
+  EXPECT_NE(x_and_y.pixels, axes({-1, 0, 0}, {0, 1, 0}).pixels);  // From behind: a cross, no dot, and x to the left.
   // x has 3 letters and a half, and y as much; the letter of z is left and below of the origin.
-  const Eigen::AlignedBox2i flat = drawn_box(extent({1, 0, 0}, {0, 1, 0}), 0);
+  const Eigen::AlignedBox2i flat = drawn_box(x_and_y, 0);
   EXPECT_NEAR(flat.sizes().x(), (3 + 0.9 + 0.9) * 13, 13);
   EXPECT_NEAR(flat.sizes().y(), (3 + 0.9 + 0.9) * 13, 13);
   EXPECT_EQ(flat.min().x(), 13);
@@ -83,7 +79,7 @@ TEST(AnnotationsTest, AxesPointAsThePictureShowsThem) {
   // Seen along the diagonal, all three are lines.
   const Eigen::Vector3d view = Eigen::Vector3d(-1, -1, -1).normalized();
   const Eigen::Vector3d right = view.cross(Eigen::Vector3d::UnitZ()).normalized();
-  EXPECT_FALSE(drawn_box(extent(right, right.cross(view)), 0).isEmpty());
+  EXPECT_FALSE(drawn_box(axes(right, right.cross(view)), 0).isEmpty());
 }
 
 /// Legends with short words, one or two, are beside the picture and cover none of it. The room is even.
@@ -139,27 +135,18 @@ std::vector<std::string> labels(const ValueRange& range, int most = 7) {
   return texts;
 }
 
-TEST(RoundTicksTest, LinearScales) {
+TEST(RoundTicksTest, ScalesAreLinearOrLogarithmic) {
   EXPECT_THAT(labels({0, 3.7}), ElementsAre("0", "1", "2", "3"));
   EXPECT_THAT(labels({0, 1}), ElementsAre("0", "0.2", "0.4", "0.6", "0.8", "1.0"));
   EXPECT_THAT(labels({-0.012, 0.03}), ElementsAre("-0.01", "0", "0.01", "0.02", "0.03"));
   EXPECT_THAT(labels({1000, 1002}, 3), ElementsAre("1000", "1001", "1002"));
   EXPECT_THAT(labels({-2.4e-6, 2.4e-6}), ElementsAre("-2e-6", "-1e-6", "0", "1e-6", "2e-6"));
   EXPECT_THAT(labels({0, 3e7}), ElementsAre("0", "0.5e7", "1.0e7", "1.5e7", "2.0e7", "2.5e7", "3.0e7"));
-}
-
-TEST(RoundTicksTest, LogarithmicScales) {
   EXPECT_THAT(labels({2e-4, 0.7, true}), ElementsAre("0.001", "0.01", "0.1"));
   EXPECT_THAT(labels({1, 1000, true}), ElementsAre("1", "10", "100", "1000"));
   EXPECT_THAT(labels({3, 30, true}), ElementsAre("5", "10", "20"));
   EXPECT_THAT(labels({3, 4, true}, 4), ElementsAre("3.0", "3.5", "4.0"));
   EXPECT_THAT(labels({1e-9, 1e6, true}), ElementsAre("1e-9", "1e-6", "0.001", "1", "1000", "1e6"));
-}
-
-Image plain(int width, int height, float value) {
-  Image image(width, height, {"R", "G", "B"});
-  std::fill(image.pixels.begin(), image.pixels.end(), value);
-  return image;
 }
 
 /// A colour bar whose green increases with the position. Its red and blue are constant and appear nowhere else.
@@ -177,7 +164,7 @@ std::vector<Eigen::Vector2i> pixels_of_bar(const Image& image) {
 
 TEST(ColorBarTest, ShowsAllPositionsFromTheBottomToTheTop) {
   for (const int size : {200, 400, 801}) {
-    Image image = plain(size * 3 / 2, size, 0);
+    Image image = blank(size * 3 / 2, size, 0);
     draw_color_bar(image, green_bar());
     const std::vector<Eigen::Vector2i> pixels = pixels_of_bar(image);
     ASSERT_FALSE(pixels.empty());
@@ -192,7 +179,7 @@ TEST(ColorBarTest, ShowsAllPositionsFromTheBottomToTheTop) {
 
 /// The lines of the ticks are white, at the heights of 0, 1, ... 4, to the right of the frame of the bar.
 TEST(ColorBarTest, TicksAreAtTheirValues) {
-  Image image = plain(1000, 1000, 0);
+  Image image = blank(1000, 1000, 0);
   draw_color_bar(image, green_bar());
   const std::vector<Eigen::Vector2i> pixels = pixels_of_bar(image);
   const double top = pixels.front().y(), bottom = pixels.back().y() + 1.0;
@@ -212,7 +199,7 @@ TEST(ColorBarTest, TicksAreAtTheirValues) {
 
 TEST(ColorBarTest, IsCutOffWhereThePictureIsSmall) {
   for (const int size : {1, 7, 40}) {
-    Image image = plain(size, size, 0.5f);
+    Image image = blank(size, size, 0.5f);
     draw_color_bar(image, green_bar());
     draw_color_key(image, {"", {{"x", {1, 0, 0}}, {"y", {0, 1, 0}}, {"z", {0, 0, 1}}}});
     for (const float value : image.pixels) EXPECT_TRUE(value >= 0 && value <= 1);
@@ -220,7 +207,7 @@ TEST(ColorBarTest, IsCutOffWhereThePictureIsSmall) {
 }
 
 TEST(ColorKeyTest, ShowsEachColorOnceFromTheTop) {
-  Image image = plain(400, 400, 0);
+  Image image = blank(400, 400, 0);
   draw_color_key(image, {"", {{"x", {1, 0, 0}}, {"y", {0, 1, 0}}, {"z", {0, 0, 1}}}});
   std::vector<int> rows[3];
   for (int y = 0; y < 400; ++y)

@@ -2,7 +2,6 @@
 
 #include <cctype>
 #include <functional>
-#include <limits>
 #include <map>
 #include <numeric>
 
@@ -71,7 +70,6 @@ TEST(LetteringTest, InkIsWithinTheLine) {
     }
 }
 
-/// The position of each character is the width of the text before it.
 TEST(LetteringTest, TextIsItsCharactersSideBySide) {
   const std::string text = "Ag 1e-3";
   const double height = 24.5;
@@ -114,8 +112,6 @@ TEST(LetteringTest, OtherCharactersAreBoxes) {
   }
   EXPECT_EQ(drawn("caf\xC3\xA9s", 20, {5, 25}, 120, 40).pixels, drawn("caf\ts", 20, {5, 25}, 120, 40).pixels);
 }
-
-const double no_landing = std::numeric_limits<double>::quiet_NaN();
 
 using Coordinate = std::function<double(double x, double y)>;
 
@@ -212,9 +208,9 @@ TEST(GridLinesTest, NoLinesBeyondThePicture) {
 TEST(GridLinesTest, LeavesAloneWhatIsNotValidOrNotFinite) {
   std::vector<PixelCoordinates> coordinates = undistorted(8, 1);
   coordinates[1].valid = false;
-  coordinates[2].st.x() = no_landing;
-  coordinates[3].per_pixel(0, 0) = no_landing;
-  coordinates[4].per_pixel(1, 1) = std::numeric_limits<double>::infinity();
+  coordinates[2].st.x() = NAN;
+  coordinates[3].per_pixel(0, 0) = NAN;
+  coordinates[4].per_pixel(1, 1) = INFINITY;
   coordinates[5].st.setConstant(1e300);
   coordinates[6].per_pixel.setConstant(1e300);
   const Image image = drawn(8, 1, coordinates, white_lines(1, 100));  // Lines so wide that they cover everything.

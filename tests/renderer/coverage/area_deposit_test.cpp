@@ -3,9 +3,8 @@
 #include <array>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <random>
-
-#include <tbb/parallel_for.h>
 
 #include "renderer/coverage/planar_mesh.h"
 #include "tests/names.h"
@@ -34,11 +33,7 @@ void add_triangle(AreaDeposit& deposit, const Vector2d& a, const Vector2d& b, co
   deposit.add_edge(c, a, density);
 }
 
-double sum(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value;
-  return sum;
-}
+double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
 double area(const std::vector<Vector2d>& polygon) {
   double twice = 0;

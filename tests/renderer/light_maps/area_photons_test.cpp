@@ -3,9 +3,7 @@
 #include "base/constants.h"
 #include "base/geometry/box.h"
 #include "renderer/light_maps/photon_tracer.h"
-#include "renderer/shading/shading.h"
-#include "tests/renderer/shapes.h"
-#include "tests/renderer/statistics.h"
+#include "tests/renderer/lit_world.h"
 
 namespace tensorray {
 namespace {
@@ -63,28 +61,18 @@ AreaLight lamp() { return {rectangle_mesh({1.8, 0.2, 3}, {1, 0, 0}, {0, -1, 0}, 
 
 AreaLight lamp_within() { return {rectangle_mesh({0.2, 0.2, 0.2}, {1, 0, 0}, {0, -1, 0}, {0.3, 0.2}), {5, 7}}; }
 
-const std::vector<Band>& both_bands() {
-  static const std::vector<Band> result{{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}};
-  return result;
-}
-
-const ReflectanceTable& colors() {
-  static const Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
-  static const ReflectanceTable table(ReflectanceModel(both_bands(), matrix), both_bands(), matrix);
-  return table;
+const TestBands& both_bands() {
+  static const TestBands two({{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}});
+  return two;
 }
 
 /// A floor below the plane, a lamp above it, and the lamp's photons on the floor.
-struct Stage {
-  Stage(const BendingRegion& region_, const MaterialSettings& floor, std::uint64_t per_pass, int passes,
+struct Stage : World {
+  Stage(const BendingRegion& region, const MaterialSettings& floor, std::uint64_t per_pass, int passes,
         const AreaLight& light = lamp())
-      : region(region_),
-        light_list{light},
-        materials{make_material(floor, BandValues::Constant(bands, 0.6)),
-                  make_material(Diffuse{}, BandValues::Zero(bands))},
-        surfaces(parts(light)),
-        lights(light_list, {0.5f, 0.5f}, surfaces.bounds()),
-        scene{surfaces, materials, lights, colors()} {
+      : World(both_bands(),
+              {surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8})), surface_of(light.mesh, 1, 0)},
+              {make_material(floor, both_bands().grey(0.6)), make_material(Diffuse{}, both_bands().grey(0))}, {light}) {
     scene.region = &region;
     scene.bands_per_view = scene.bands_per_bounce = 2;
     PhotonTracerSettings settings;
@@ -95,46 +83,24 @@ struct Stage {
     photons = trace_photons(region, corners(), surfaces, light_list, settings, {});
   }
 
-  static std::vector<ShadedSurface> parts(const AreaLight& light) {
-    std::vector<ShadedSurface> result(2);
-    result[0].shape = rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8});
-    result[1].shape = light.mesh;
-    result[1].material = 1;
-    result[1].light = 0;
-    return result;
-  }
-
-  /// Radiance of a point of the floor in a band. @param with_photons  Whether photons are a technique, too.
-  Mean seen(DirectLight direct, bool with_photons, int band) {
+  /// Radiance of a point of the floor in the second band. @param with_photons  Whether photons are a technique, too.
+  Mean radiance(DirectLight direct, bool with_photons) {
     ShadingSettings settings;
     settings.direct = direct;
     settings.max_depth = 1;
     scene.photons = with_photons ? &photons : nullptr;
-    RayShader shader(scene, settings);
-    const Vector3d from(0.4, -2.9, -0.6), to(0.3, -0.1, -0.8);
-    Mean mean;
-    for (std::uint64_t i = 0; i < 60000; ++i) {
-      shader.shade({{from, (to - from).normalized(), {3, i, 0, 0}}}, true);
-      mean.add(shader.radiance(0)[band]);
-    }
-    return mean;
+    return seen(scene, settings, {0.4, -2.9, -0.6}, {0.3, -0.1, -0.8}, 60000, 1);
   }
 
-  const BendingRegion& region;
-  std::vector<Light> light_list;
-  std::vector<Material> materials;
-  SurfaceScene surfaces;
-  LightSampler lights;
-  ShadedScene scene;
   PhotonMaps photons;
 };
 
 /// Of a diffuse floor, all photons together, without weights.
-double by_photons_alone(const Stage& stage, int band) {
+double by_photons_alone(const Stage& stage) {
   const auto point = *stage.surfaces.intersect({0.3, -0.1, -0.5}, {0, 0, -1});
   double sum = 0;
   for (const PhotonMap& pass : stage.photons.passes)
-    pass.visit(point, band, [&](const Photon& photon, double density) { sum += photon.power * density; });
+    pass.visit(point, 1, [&](const Photon& photon, double density) { sum += photon.power * density; });
   return 0.6 / pi * sum / static_cast<double>(stage.photons.passes.size());
 }
 
@@ -154,32 +120,31 @@ TEST(AreaPhotonsTest, EverySubsetOfTechniquesHasTheSameMean) {
       if (steeper == 1 && !is_diffuse) continue;
       const BendingPlane plane(0.15, steeper), wrong(-0.15, 1 / steeper);
       Stage stage(plane, floor, 300, 1024);
-      const Mean truth = stage.seen(DirectLight::both, false, 1);
+      const Mean truth = stage.radiance(DirectLight::both, false);
       EXPECT_LT(truth.error(), 0.03 * truth.mean());
       for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material})
         for (const bool with_photons : {false, true}) {
-          const Mean mean = stage.seen(direct, with_photons, 1);
+          const Mean mean = stage.radiance(direct, with_photons);
           const double noise = with_photons ? 0.05 * truth.mean() : 0;
           EXPECT_NEAR(mean.mean(), truth.mean(), 4.5 * std::hypot(mean.error(), truth.error()) + noise)
               << static_cast<int>(direct) << with_photons << " " << steeper;
         }
       if (is_diffuse) {
-        const double alone = by_photons_alone(Stage(plane, floor, 30000, 32), 1);
+        const double alone = by_photons_alone(Stage(plane, floor, 30000, 32));
         EXPECT_NEAR(alone, truth.mean(), 4.5 * truth.error() + 0.06 * truth.mean()) << steeper;
       }
       if (steeper == 1) continue;
       // Photons that bend the wrong way do not add up with rays that bend the right way.
       stage.photons = Stage(wrong, floor, 300, 1024).photons;
-      const double difference = stage.seen(DirectLight::both, true, 1).mean() - truth.mean();
+      const double difference = stage.radiance(DirectLight::both, true).mean() - truth.mean();
       EXPECT_GT(std::abs(difference), 0.15 * truth.mean());
     }
 }
 
-/// Photons have most of the weight where aim misses a small lamp and many photons are near.
 TEST(AreaPhotonsTest, PhotonsRemoveNoiseWhereAimMisses) {
   const BendingPlane plane(0.8);
   Stage stage(plane, Diffuse{}, 30000, 32);
-  const Mean without = stage.seen(DirectLight::both, false, 1), with = stage.seen(DirectLight::both, true, 1);
+  const Mean without = stage.radiance(DirectLight::both, false), with = stage.radiance(DirectLight::both, true);
   EXPECT_NEAR(with.mean(), without.mean(), 4.5 * without.error() + 0.06 * without.mean());
   EXPECT_LT(with.error(), 0.3 * without.error());
 }
@@ -213,11 +178,11 @@ TEST(AreaPhotonsTest, PowerIsThatOfTheLampTowardsTheVolume) {
 TEST(AreaPhotonsTest, ALampWithinTheRegionHasTheSameMeanByPhotons) {
   const BendingPlane plane(0.15, 1.3);
   Stage stage(plane, Diffuse{}, 300, 1024, lamp_within());
-  const Mean truth = stage.seen(DirectLight::both, false, 1), with = stage.seen(DirectLight::both, true, 1);
+  const Mean truth = stage.radiance(DirectLight::both, false), with = stage.radiance(DirectLight::both, true);
   EXPECT_LT(truth.error(), 0.03 * truth.mean());
   EXPECT_NEAR(with.mean(), truth.mean(), 4.5 * std::hypot(with.error(), truth.error()) + 0.05 * truth.mean());
   const Stage many(plane, Diffuse{}, 30000, 32, lamp_within());
-  EXPECT_NEAR(by_photons_alone(many, 1), truth.mean(), 4.5 * truth.error() + 0.06 * truth.mean());
+  EXPECT_NEAR(by_photons_alone(many), truth.mean(), 4.5 * truth.error() + 0.06 * truth.mean());
   EXPECT_DOUBLE_EQ(PhotonEmitter(lamp_within(), corners(), {}).power(), pi * 0.3 * 0.2);
 }
 

@@ -10,9 +10,7 @@
 #include "base/process/job.h"
 #include "renderer/light_maps/photon_map.h"
 #include "renderer/sampling/random.h"
-#include "renderer/shading/shading.h"
-#include "tests/renderer/shapes.h"
-#include "tests/renderer/statistics.h"
+#include "tests/renderer/lit_world.h"
 
 namespace tensorray {
 namespace {
@@ -92,7 +90,6 @@ double power_in(const PhotonMaps& photons, int band) {
   return sum / static_cast<double>(photons.passes.size());
 }
 
-/// Every photon of the sun lands, and the floor has the power of the cube's silhouette.
 TEST(PhotonTracerTest, TheSunsPowerIsThatOfTheSilhouette) {
   const SurfaceScene floor = floor_at(-0.8, 40);
   const Vector3d direction = Vector3d(0.4, 0.3, -1).normalized();
@@ -133,7 +130,6 @@ TEST(PhotonTracerTest, KeptPhotonsThatAreNoneAreRefused) {
   EXPECT_THROW(trace_with([](Photon& photon) { photon.light = 1; }), DamagedArchive);
 }
 
-/// Within a chunk: no photon starts afterwards.
 TEST(PhotonTracerTest, IsCancelledBetweenPhotons) {
   struct CancellingCube : ClearCube {
     explicit CancellingCube(Progress& progress) : progress_(progress) {}
@@ -172,7 +168,6 @@ TEST(PhotonTracerTest, EveryPhotonEnds) {
   EXPECT_NEAR(static_cast<double>(open.counts[0].ends[2]) / (4000.0 * traced_bands), 0.75, 0.01);
 }
 
-/// A region that bends nothing: photons give the irradiance of straight light, within the region and behind it.
 TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
   const Vector3d slanted(0.2, -0.1, -1);
   const PointLight point{{0.3, 0.2, 2}, {5, 7}};
@@ -193,7 +188,6 @@ TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
   }
 }
 
-/// The light of a small plate is that of the photons that land on it, in spite of the radius.
 TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
   const SurfaceScene floor = floor_at(-0.8, 0.5);
   PhotonTracerSettings settings = settings_of(3000, 4, 0.12);
@@ -216,16 +210,13 @@ TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
 
 /// The shading of photons is that of next-event estimation where nothing bends: one or the other, never both.
 TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
-  const SurfaceScene floor = floor_at(-0.8, 8);
-  const std::vector<Material> materials{make_material(Diffuse{}, BandValues::Constant(traced_bands, 0.6))};
-  const std::vector<Light> lights{sun({0.2, -0.1, -1}), PointLight{{0.3, 0.2, 2}, {5, 7}}};
-  const LightSampler sampler(lights, {0.5f, 0.5f}, floor.bounds());
-  const std::vector<Band> both{{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}};
-  const Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
-  const ReflectanceTable colors(ReflectanceModel(both, matrix), both, matrix);
+  const TestBands both({{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}});
+  const World world(both, {surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8}))},
+                    {make_material(Diffuse{}, both.grey(0.6))},
+                    {sun({0.2, -0.1, -1}), PointLight{{0.3, 0.2, 2}, {5, 7}}});
   const ClearCube cube;
-  const PhotonMaps photons = traced(cube, floor, lights, settings_of(4000, 16, 0.1));
-  ShadedScene straight{floor, materials, sampler, colors}, bent = straight;
+  const PhotonMaps photons = traced(cube, world.surfaces, world.light_list, settings_of(4000, 16, 0.1));
+  ShadedScene bent = world.scene;
   bent.region = &cube;
   bent.photons = &photons;
   const auto mean_of = [&](const ShadedScene& scene, double x) {
@@ -238,13 +229,12 @@ TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
     }
     return mean;
   };
-  const Mean with = mean_of(bent, 0.1), without = mean_of(straight, 0.1), beside = mean_of(bent, 2);
+  const Mean with = mean_of(bent, 0.1), without = mean_of(world.scene, 0.1), beside = mean_of(bent, 2);
   EXPECT_NEAR(with.mean(), without.mean(), 0.03 * without.mean());
   EXPECT_GT(without.mean(), 0.1);
-  EXPECT_NEAR(beside.mean(), mean_of(straight, 2).mean(), 5 * beside.error() + 1e-9);
+  EXPECT_NEAR(beside.mean(), mean_of(world.scene, 2).mean(), 5 * beside.error() + 1e-9);
 }
 
-/// The lattice finds what a search through all photons finds.
 TEST(PhotonTracerTest, VisitsAllPhotonsInReach) {
   std::vector<Photon> photons(3000);
   for (std::size_t i = 0; i < photons.size(); ++i) {
@@ -281,7 +271,7 @@ TEST(PhotonTracerTest, VisitsAllPhotonsInReach) {
 /// half a percent.
 TEST(PhotonTracerTest, APointWithinTheRegionShinesAllAround) {
   constexpr double size = 40;
-  constexpr std::uint64_t count = 200000;
+  constexpr std::uint64_t count = 60000;
   for (const double z : {0.2, 0.505}) {
     const PointLight point{{0.1, 0, z}, {5, 7}};
     const double height = z + 0.8, part = (1 - height / std::hypot(height, size / 2)) / 2;

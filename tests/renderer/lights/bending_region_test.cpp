@@ -1,9 +1,8 @@
 #include "renderer/lights/bending_region.h"
 
 #include "base/constants.h"
-#include "renderer/camera/path_tracer.h"
 #include "renderer/meshes/mesh.h"
-#include "tests/renderer/statistics.h"
+#include "tests/renderer/lit_world.h"
 
 namespace tensorray {
 namespace {
@@ -46,60 +45,29 @@ class TurningBall : public BendingRegion {
   double angle_, radiance_scale_;
 };
 
-std::vector<Band> test_bands() {
-  return {{620, 60, 0.25, Vector3d(1, 0.3, 0)},
-          {560, 60, 0.25, Vector3d(0.2, 0.5, 0)},
-          {500, 60, 0.25, Vector3d(0, 0.15, 0.2)},
-          {440, 60, 0.25, Vector3d(0.1, 0.05, 0.8)}};
+const TestBands& four_bands() {
+  static const TestBands result({{620, 60, 0.25, Vector3d(1, 0.3, 0)},
+                                 {560, 60, 0.25, Vector3d(0.2, 0.5, 0)},
+                                 {500, 60, 0.25, Vector3d(0, 0.15, 0.2)},
+                                 {440, 60, 0.25, Vector3d(0.1, 0.05, 0.8)}});
+  return result;
 }
 
-const ReflectanceTable& colors() {
-  static const Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
-  static const ReflectanceTable table(ReflectanceModel(test_bands(), matrix), test_bands(), matrix);
-  return table;
-}
-
-std::vector<float> even(float value) { return std::vector<float>(bands, value); }
+std::vector<float> even(float value) { return four_bands().even(value); }
 
 /// A floor below the ball, lit by `lights`, of which the first may be the area light of a lamp.
-struct Stage {
-  explicit Stage(const std::vector<Light>& light_list, double albedo = 0.6)
-      : materials{make_material(Diffuse{}, BandValues::Constant(bands, albedo)),
-                  make_material(Diffuse{}, BandValues::Zero(bands))},
-        surfaces(parts(light_list)),
-        lights(light_list, {0.3f, 0.5f, 0.15f, 0.05f}, surfaces.bounds()),
-        scene{surfaces, materials, lights, colors()} {}
+struct Stage : World {
+  explicit Stage(const std::vector<Light>& all_lights, double albedo = 0.6)
+      : World(four_bands(), parts(all_lights),
+              {make_material(Diffuse{}, four_bands().grey(albedo)), make_material(Diffuse{}, four_bands().grey(0))},
+              all_lights) {}
 
   static std::vector<ShadedSurface> parts(const std::vector<Light>& lights) {
-    std::vector<ShadedSurface> result(1);
-    result[0].shape = rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8});
-    if (const auto* lamp = std::get_if<AreaLight>(&lights[0])) {
-      ShadedSurface surface;
-      surface.shape = lamp->mesh;
-      surface.material = 1;
-      surface.light = 0;
-      result.push_back(surface);
-    }
+    std::vector<ShadedSurface> result{surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8}))};
+    if (const auto* lamp = std::get_if<AreaLight>(&lights[0])) result.push_back(surface_of(lamp->mesh, 1, 0));
     return result;
   }
-
-  std::vector<Material> materials;
-  SurfaceScene surfaces;
-  LightSampler lights;
-  ShadedScene scene;
 };
-
-/// The mean over the bands, averaged over rays from one point to another.
-Mean seen(const ShadedScene& scene, const ShadingSettings& settings, const Vector3d& from, const Vector3d& to,
-          std::uint64_t samples) {
-  RayShader shader(scene, settings);
-  Mean mean;
-  for (std::uint64_t i = 0; i < samples; ++i) {
-    shader.shade({{from, (to - from).normalized(), {3, i, 0, 0}}}, true);
-    mean.add(shader.radiance(0).mean());
-  }
-  return mean;
-}
 
 AreaLight lamp() { return {rectangle_mesh({0.3, 0, 1.2}, {1, 0, 0}, {0, -1, 0}, {0.8, 0.8}), even(5)}; }
 
@@ -128,7 +96,6 @@ TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
     EXPECT_NEAR(means[i].mean(), means[0].mean(), 4.5 * std::hypot(means[i].error(), means[0].error())) << i;
 }
 
-/// Rays that are shaded together are followed together, and see what each of them sees alone, bit for bit.
 TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
   Stage stage({lamp(), ConstantLight{even(0.2f)}});
   const TurningBall ball(0.4, 1.5);
@@ -205,24 +172,19 @@ TEST(BendingRegionTest, AnIrradianceMapReplacesTheSunBehindTheRegion) {
 TEST(BendingRegionTest, BentLightIsLimitedInAllBandsAlike) {
   TriangleMesh room = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, Eigen::Affine3d::Identity());
   for (auto& triangle : room.triangles) std::swap(triangle[1], triangle[2]);  // They face inwards.
-  const AreaLight walls{room, even(8)};
-  ShadedSurface surface;
-  surface.shape = room;
-  surface.light = 0;
-  const std::vector<Material> materials{make_material(Diffuse{}, BandValues::Constant(bands, 0.5))};
-  const SurfaceScene surfaces({surface});
-  const LightSampler lights({walls}, {0.3f, 0.5f, 0.15f, 0.05f}, surfaces.bounds());
-  ShadedScene scene{surfaces, materials, lights, colors()};
+  World world(four_bands(), {surface_of(room, 0, 0)}, {make_material(Diffuse{}, four_bands().grey(0.5))},
+              {AreaLight{room, even(8)}});
   const TurningBall ball(0.7);
-  scene.region = &ball;
+  world.scene.region = &ball;
   ShadingSettings settings;
   settings.direct = DirectLight::material;  // Each contribution is 8 / 2^depth.
   settings.roulette_depth = 100;
   settings.max_depth = 3;
   settings.indirect_clamp = 0.5;
   for (const int count : {1, 2, 4}) {
-    scene.bands_per_view = scene.bands_per_bounce = count;
-    EXPECT_NEAR(seen(scene, settings, {0.9, 0.1, 0.3}, {0, 0, 0.1}, 200).mean(), 8 + 4 + 0.5 + 0.5, 1e-6) << count;
+    world.scene.bands_per_view = world.scene.bands_per_bounce = count;
+    EXPECT_NEAR(seen(world.scene, settings, {0.9, 0.1, 0.3}, {0, 0, 0.1}, 200).mean(), 8 + 4 + 0.5 + 0.5, 1e-6)
+        << count;
   }
 }
 

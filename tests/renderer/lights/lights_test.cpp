@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "base/constants.h"
+#include "base/geometry/box.h"
 #include "renderer/lights/beam.h"
 #include "renderer/sampling/random.h"
 #include "renderer/sampling/sampling.h"
@@ -180,26 +181,23 @@ TEST(LightSampler, NamesTheLightThatIsWrong) {
   };
   EXPECT_EQ(error(ConstantLight{{1}}), "light 1: radiance must have a finite value >= 0 for each of the 2 bands");
   EXPECT_THROW(LightSampler({ConstantLight{{1}}}, {0}, unit_scene), std::invalid_argument);
-  const auto is_named = [&](const Light& light, const std::string& what) {
-    EXPECT_EQ(error(light).find("light 1: "), 0u) << error(light);
-    EXPECT_NE(error(light).find(what), std::string::npos) << error(light);
-  };
-  is_named(ConstantLight{{1, NAN}}, "radiance");
-  is_named(AreaLight{{}, {1, 1}}, "triangles");
-  is_named(AreaLight{{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}}, {1, 1}}, "area");
-  is_named(AreaLight{lamp(1).mesh, {1, -1}}, "radiance");
-  is_named(DirectionalLight{{0, 0, 0}, {1, 1}, 0}, "direction");
-  is_named(DirectionalLight{{0, 0, 1}, {1}, 0}, "irradiance");
-  is_named(DirectionalLight{{0, 0, 1}, {1, 1}, 2}, "angle");
-  is_named(sky(1), "bands");
+  for (const auto& [light, what] : std::vector<std::pair<Light, std::string>>{
+           {ConstantLight{{1, NAN}}, "radiance"},
+           {AreaLight{{}, {1, 1}}, "triangles"},
+           {AreaLight{{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}}, {1, 1}}, "area"},
+           {AreaLight{lamp(1).mesh, {1, -1}}, "radiance"},
+           {DirectionalLight{{0, 0, 0}, {1, 1}, 0}, "direction"},
+           {DirectionalLight{{0, 0, 1}, {1}, 0}, "irradiance"},
+           {DirectionalLight{{0, 0, 1}, {1, 1}, 2}, "angle"},
+           {sky(1), "bands"}})
+    EXPECT_THAT(error(light), AllOf(StartsWith("light 1: "), HasSubstr(what)));
 }
 
 constexpr BeamPattern all_patterns[] = {BeamPattern::grid, BeamPattern::stratified, BeamPattern::sobol,
                                         BeamPattern::random};
 
-std::vector<Vector3d> cube_corners() {
-  std::vector<Vector3d> corners;
-  for (int i = 0; i < 8; ++i) corners.emplace_back(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
+const std::vector<Vector3d>& cube_corners() {
+  static const std::vector<Vector3d> corners = corners_of(unit_scene);
   return corners;
 }
 

@@ -203,7 +203,7 @@ TEST(ReadMeshTest, PolygonsHaveTheirArea) {
 
 TEST(ReadMeshTest, PolygonsThatCrossThemselvesAreDivided) {
   Polygon star;  // Its corners are on a circle, in an order that has no ear.
-  constexpr int count = 9999, step = 4999;
+  constexpr int count = 5999, step = 2999;
   for (int i = 0; i < count; ++i) {
     const double angle = 2 * pi * static_cast<double>(i * static_cast<long>(step) % count) / count;
     star.corners.emplace_back(std::cos(angle) + 1e-3 * (i % 7), std::sin(angle), 0);
@@ -215,7 +215,7 @@ TEST(ReadMeshTest, PolygonsThatCrossThemselvesAreDivided) {
 /// Most of its corners are no ear, and each ear that is cut makes only its neighbours one.
 TEST(ReadMeshTest, PolygonsWithManyConcaveCornersAreDivided) {
   Polygon crescent;
-  constexpr int count = 4999;
+  constexpr int count = 2999;
   const auto add = [&](double radius, double centre, double angle) {
     crescent.corners.emplace_back(centre + radius * std::cos(angle), radius * std::sin(angle), 0);
   };
@@ -264,28 +264,6 @@ TEST(ReadMeshTest, EveryWayToWriteAnObjFace) {
     const Temporary file("face.obj", content);
     EXPECT_DOUBLE_EQ(surface_area(read_mesh(file.path())), 2) << content;
   }
-}
-
-TEST(ReadMeshTest, ObjErrorsNameTheLine) {
-  const std::string vertices = "v 0 0 0\nv 2 0 0\nv 0 2 0\n";
-  for (const auto& [rest, text] :
-       std::vector<std::pair<std::string, std::string>>{{"f 1 2 0\n", "line 4: the face names vertex 0"},
-                                                        {"f 1 2 3\nf 1 2 -4\n", "line 5: the face names vertex -4"},
-                                                        {"f 1//1 2//1 3//1\n", "line 4: the face names normal 1 of 0"},
-                                                        {"f 1 2 x\n", "line 4: the face has \"x\""},
-                                                        {"f 1 2 3x\n", "line 4: the face has \"3x\""},
-                                                        {"f 1 2\n", "line 4: a face needs at least three"},
-                                                        {"v 1 2\n", "line 4: \"v\" needs three numbers"},
-                                                        {"v 1 2 three\n", "line 4: \"three\" is not a number"},
-                                                        {"v 1e400 0 0\nf 1 2 4\n", "vertex 2 is not finite"},
-                                                        {"surf 0 1 0 1 1 2\n", "line 4: \"surf\" is not read"},
-                                                        {"F 1 2 3\n", "line 4: \"F\" is not read"},
-                                                        {"v 0 0 0 0\n", "line 4: the vertex has the weight 0"}}) {
-    const Temporary file("bad.obj", vertices + rest);
-    EXPECT_THAT(message([&] { read_mesh(file.path()); }), HasSubstr(text)) << rest;
-  }
-  const Temporary file("two.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n");
-  EXPECT_THAT(message([&] { read_mesh(file.path()); }), HasSubstr("face 0 has 2 corners"));
 }
 
 /// A tetrahedron with corners at 1, 2 and 3 along the axes of its file.
@@ -366,46 +344,59 @@ TEST(ReadMeshTest, PlyFilesThatWereCutOffAreRefused) {
     }
 }
 
+/// `text`, with one part of it replaced.
+std::string replaced(std::string text, const std::string& part, const std::string& by) {
+  return text.replace(text.find(part), part.size(), by);
+}
+
 TEST(ReadMeshTest, BadFilesAreOneClearLine) {
-  const auto error = [](const std::string& name, const std::string& content) {
+  const std::string garbage = "no mesh at all\n\x01\x02\x03 v f\n", tetrahedron = tetrahedron_ply,
+                    three = "v 0 0 0\nv 2 0 0\nv 0 2 0\n";
+  const std::string strip =
+      "ply\nformat binary_little_endian 1.0\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+  struct Case {
+    std::string name, content, error;
+  };
+  for (const auto& [name, content, error] : std::vector<Case>{
+           {"empty.ply", "", "empty"},
+           {"garbage.ply", garbage, "cannot read the mesh"},
+           {"garbage.obj", garbage, "cannot read the mesh"},
+           {"garbage.stl", garbage, "cannot read the mesh"},
+           {"garbage.unknown", garbage, "cannot read the mesh"},
+           {"points.ply", ply_header("ascii", 2, 0) + "0 0 0\n1 1 1\n", "no triangles"},
+           {"lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", "no triangles"},
+           {"flat.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n", "no triangles"},
+           {"bad.obj", three + "f 1 2 0\n", "line 4: the face names vertex 0"},
+           {"bad.obj", three + "f 1 2 3\nf 1 2 -4\n", "line 5: the face names vertex -4"},
+           {"bad.obj", three + "f 1//1 2//1 3//1\n", "line 4: the face names normal 1 of 0"},
+           {"bad.obj", three + "f 1 2 x\n", "line 4: the face has \"x\""},
+           {"bad.obj", three + "f 1 2 3x\n", "line 4: the face has \"3x\""},
+           {"bad.obj", three + "f 1 2\n", "line 4: a face needs at least three"},
+           {"bad.obj", three + "v 1 2\n", "line 4: \"v\" needs three numbers"},
+           {"bad.obj", three + "v 1 2 three\n", "line 4: \"three\" is not a number"},
+           {"bad.obj", three + "v 1e400 0 0\nf 1 2 4\n", "vertex 2 is not finite"},
+           {"bad.obj", three + "surf 0 1 0 1 1 2\n", "line 4: \"surf\" is not read"},
+           {"bad.obj", three + "F 1 2 3\n", "line 4: \"F\" is not read"},
+           {"bad.obj", three + "v 0 0 0 0\n", "line 4: the vertex has the weight 0"},
+           {"two.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "face 0 has 2 corners"},
+           {"index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "line 4: the face names vertex 9 of 3"},
+           {"nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"},
+           {"index.ply", replaced(tetrahedron, "3 1 2 3", "3 1 2 4"), "not there"},
+           {"negative.ply", replaced(tetrahedron, "3 1 2 3", "3 1 2 -1"), "not there"},
+           {"word.ply", ply_header("ascii", 1, 0) + "0 zero 0\n", "\"zero\" is not a number"},
+           {"type.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty complex x\nend_header\n1\n", "\"complex\""},
+           {"count.ply", "ply\nformat ascii 1.0\nelement vertex\nend_header\n", "no count"},
+           {"strip.ply", strip + std::string("\xff\xc9\x9a\x3b", 4), "cut off"},
+           {"huge.ply", ply_header("binary_little_endian", 2000000000, 3) + "abc", "cut off"},
+           {"nan.ply", replaced(tetrahedron, "1 0 0", "nan 0 0"), "not finite"},
+           {"far.ply", replaced(tetrahedron, "1 0 0", "1e39 0 0"), "vertex 1 is not finite in single precision"}}) {
     const Temporary file(name, content);
     ::testing::internal::CaptureStdout();
     ::testing::internal::CaptureStderr();
     const std::string text = message([&] { read_mesh(file.path()); });
     EXPECT_EQ(::testing::internal::GetCapturedStdout() + ::testing::internal::GetCapturedStderr(), "") << name;
-    EXPECT_THAT(text, HasSubstr(file.path().string() + ": "));
-    return text;
-  };
-  EXPECT_THAT(error("empty.ply", ""), HasSubstr("empty"));
-  for (const std::string name : {"garbage.ply", "garbage.obj", "garbage.stl", "garbage.unknown"})
-    EXPECT_THAT(error(name, "no mesh at all\n\x01\x02\x03 v f\n"), HasSubstr("cannot read the mesh"));
-  EXPECT_THAT(error("points.ply", ply_header("ascii", 2, 0) + "0 0 0\n1 1 1\n"), HasSubstr("no triangles"));
-  EXPECT_THAT(error("lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"), HasSubstr("no triangles"));
-  EXPECT_THAT(error("flat.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"),
-              HasSubstr("no triangles"));
-  EXPECT_THAT(error("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"),
-              HasSubstr("line 4: the face names vertex 9 of 3"));
-  EXPECT_THAT(error("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), HasSubstr("not finite"));
-  std::string beyond = tetrahedron_ply;
-  beyond.replace(beyond.find("3 1 2 3"), 7, "3 1 2 4");
-  EXPECT_THAT(error("index.ply", beyond), HasSubstr("not there"));
-  beyond.replace(beyond.find("3 1 2 4"), 7, "3 1 2 -1");
-  EXPECT_THAT(error("negative.ply", beyond), HasSubstr("not there"));
-  EXPECT_THAT(error("word.ply", ply_header("ascii", 1, 0) + "0 zero 0\n"), HasSubstr("\"zero\" is not a number"));
-  EXPECT_THAT(error("type.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty complex x\nend_header\n1\n"),
-              HasSubstr("\"complex\""));
-  EXPECT_THAT(error("count.ply", "ply\nformat ascii 1.0\nelement vertex\nend_header\n"), HasSubstr("no count"));
-  EXPECT_THAT(error("strip.ply",
-                    "ply\nformat binary_little_endian 1.0\nelement tristrips 1\n"
-                    "property list int int vertex_indices\nend_header\n" +
-                        std::string("\xff\xc9\x9a\x3b", 4)),
-              HasSubstr("cut off"));
-  EXPECT_THAT(error("huge.ply", ply_header("binary_little_endian", 2000000000, 3) + "abc"), HasSubstr("cut off"));
-  std::string not_finite = tetrahedron_ply;
-  not_finite.replace(not_finite.find("1 0 0"), 5, "nan 0 0");
-  EXPECT_THAT(error("nan.ply", not_finite), HasSubstr("not finite"));
-  not_finite.replace(not_finite.find("nan 0 0"), 7, "1e39 0 0");
-  EXPECT_THAT(error("far.ply", not_finite), HasSubstr("vertex 1 is not finite in single precision"));
+    EXPECT_THAT(text, AllOf(HasSubstr(file.path().string() + ": "), HasSubstr(error)));
+  }
   EXPECT_EQ(message([] { read_mesh("/no/such.ply"); }), "cannot read /no/such.ply: no such file");
   EXPECT_THAT(message([] { read_mesh(::testing::TempDir()); }), HasSubstr("folder"));
 }

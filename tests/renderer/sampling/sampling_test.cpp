@@ -14,6 +14,12 @@ namespace {
 
 Vector2d uniform(int i) { return {random_uniform(11, i, 0), random_uniform(11, i, 1)}; }
 
+/// The score of the pairs (first(i), second(i)), which are uniform only if both are uniform and independent.
+template <class First, class Second>
+double pair_score(const First& first, const Second& second) {
+  return square_score([&](int i) { return Vector2d(first(i), second(i)); });
+}
+
 double turn(double x, double y) { return std::atan2(y, x) / (2 * pi) + 0.5; }
 
 TEST(PathSampler, SingleNumbersAreStratified) {
@@ -53,16 +59,15 @@ TEST(PathSampler, DimensionsAndPixelsAreUnrelated) {
   const auto number = [](std::uint64_t pixel, int sample, std::uint32_t dimension) {
     return PathSampler{5, pixel, static_cast<std::uint32_t>(sample), dimension}.next_1d();
   };
+  const auto pair = [](int i) { return PathSampler{5, static_cast<std::uint64_t>(i), 0}.next_2d(); };
   // Each number alone is stratified. This leaves 31 * 31 of 1023 degrees of freedom: 1.4 standard deviations less.
-  EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(0, i, 0), number(0, i, 1)); })), 5.5);
-  EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(0, i, 0), number(1, i, 0)); })), 5.5);
+  EXPECT_LT(std::abs(pair_score([&](int i) { return number(0, i, 0); }, [&](int i) { return number(0, i, 1); })), 5.5);
+  EXPECT_LT(std::abs(pair_score([&](int i) { return number(0, i, 0); }, [&](int i) { return number(1, i, 0); })), 5.5);
   // The first sample of each pixel, and two of its dimensions.
-  EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(i, 0, 0), number(i, 0, 1)); })), 4);
-  EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(i, 0, 0), number(i + 1, 0, 0)); })), 4);
-  EXPECT_LT(std::abs(square_score([&](int i) {
-              return PathSampler{5, static_cast<std::uint64_t>(i), 0}.next_2d();
-            })),
+  EXPECT_LT(std::abs(pair_score([&](int i) { return number(i, 0, 0); }, [&](int i) { return number(i, 0, 1); })), 4);
+  EXPECT_LT(std::abs(pair_score([&](int i) { return number(i, 0, 0); }, [&](int i) { return number(i + 1, 0, 0); })),
             4);
+  EXPECT_LT(std::abs(square_score(pair)), 4);
 }
 
 TEST(FrameAbout, IsRightHandedAndOrthonormal) {
@@ -77,8 +82,6 @@ TEST(FrameAbout, IsRightHandedAndOrthonormal) {
   }
 }
 
-// Applies the textbook inverse to the result of each warp; the inverse must return a uniform square.
-
 TEST(CircleAt, IsCosineAndSine) {
   for (int i = -20000; i <= 20000; ++i) {
     const double turn = i / 10000.0;
@@ -88,7 +91,6 @@ TEST(CircleAt, IsCosineAndSine) {
   }
 }
 
-/// One number chooses with the given probability, and what is left of it is uniform after either choice.
 TEST(Choose, LeavesAnEvenNumber) {
   constexpr int count = 60000;
   for (const double share : {0.0, 1e-3, 0.3, 1.0}) {
@@ -104,6 +106,8 @@ TEST(Choose, LeavesAnEvenNumber) {
       for (const int bin : bins[chosen]) EXPECT_NEAR(bin, count * (chosen ? share : 1 - share) / 10, 1.5) << share;
   }
 }
+
+// The textbook inverse of each warp must return a uniform square.
 
 TEST(Warps, DiskIsEven) {
   EXPECT_LT(std::abs(square_score([](int i) {
@@ -131,12 +135,6 @@ TEST(Warps, Cone) {
   EXPECT_NEAR(cone_solid_angle(pi), 4 * pi, 1e-14);
   EXPECT_NEAR(cone_solid_angle(pi / 2), 2 * pi, 1e-14);
   EXPECT_NEAR(cone_solid_angle(1e-7) / (pi * 1e-14), 1, 1e-9);
-}
-
-/// The score of the pairs (first(i), second(i)), which are uniform only if both are uniform and independent.
-template <class First, class Second>
-double pair_score(const First& first, const Second& second) {
-  return square_score([&](int i) { return Eigen::Vector2d(first(i), second(i)); });
 }
 
 TEST(RandomUniformTest, KeysAreIndependent) {

@@ -2,9 +2,7 @@
 
 #include <limits>
 #include <optional>
-#include <random>
-
-#include <tbb/parallel_for.h>
+#include <set>
 
 #include "base/constants.h"
 #include "renderer/lights/lights.h"
@@ -17,6 +15,8 @@
 
 namespace tensorray {
 namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
 
 Vector3d random_direction(int index) {
   return square_to_sphere({random_uniform(7, index, 0), random_uniform(7, index, 1)});
@@ -35,7 +35,7 @@ struct BoxCrossing {
 
 std::optional<BoxCrossing> cross_box(const Eigen::AlignedBox3d& box, const Vector3d& origin,
                                      const Vector3d& direction) {
-  double enter = -std::numeric_limits<double>::infinity(), leave = -enter;
+  double enter = -infinite, leave = infinite;
   int enter_axis = 0, leave_axis = 0;
   for (int axis = 0; axis < 3; ++axis) {
     const double a = (box.min()[axis] - origin[axis]) / direction[axis];
@@ -175,15 +175,16 @@ TEST(SurfaceSceneTest, BentCurvesHaveNoGapsAndSmoothNormals) {
 }
 
 TEST(SurfaceSceneTest, ConvexSurfacesDoNotShadowThemselves) {
-  std::vector<float> radii(4, 0.1f);
-  const SurfaceScene round({curve({{50, 0, -1}, {50, 0, -0.3}, {50, 0, 0.2}, {50, 0, 1}}, radii)});
+  const auto tube = [](float radius) {
+    return curve({{50, 0, -1}, {50, 0, -0.3}, {50, 0, 0.2}, {50, 0, 1}}, std::vector<float>(4, radius));
+  };
+  const SurfaceScene round({tube(0.1f)});
   const SurfaceScene box(
       {surface_of(box_mesh({Vector3d(49, -1, -1), Vector3d(51, 1, 1)}, Eigen::Affine3d::Identity()))});
   // A thin tube in a large scene.
   ShadedSurface floor =
       surface_of(box_mesh({Vector3d(-20, -20, -9), Vector3d(120, 20, -8)}, Eigen::Affine3d::Identity()));
-  const SurfaceScene thin(
-      {curve({{50, 0, -1}, {50, 0, -0.3}, {50, 0, 0.2}, {50, 0, 1}}, {0.02f, 0.02f, 0.02f, 0.02f}), floor});
+  const SurfaceScene thin({tube(0.02f), floor});
   for (const SurfaceScene* scene : {&round, &box, &thin}) {
     int hits = 0;
     for (int i = 0; i < 3000; ++i) {
@@ -255,9 +256,8 @@ TEST(SurfaceSceneTest, DataAreInterpolatedAndPathsAreCounted) {
     EXPECT_TRUE(hit);
     return scene.data(*hit);
   };
-  const auto hit = scene.intersect({0.5, 0.25, 3}, {0, 0, -1});
-  ASSERT_TRUE(hit);
-  EXPECT_NEAR((hit->color - Vector3f(0.5f, 0.25f, 0.1f) * 1.25f).norm(), 0, 1e-6);
+  EXPECT_NEAR((scene.intersect({0.5, 0.25, 3}, {0, 0, -1})->color - Vector3f(0.5f, 0.25f, 0.1f) * 1.25f).norm(), 0,
+              1e-6);
   EXPECT_NEAR(*data_at(0.5, 0.25).force, 3.25, 1e-5);
   EXPECT_NEAR(*data_at(0.5, 0.25).arc_length, 5.5, 1e-5);
   EXPECT_EQ(data_at(0.5, 0.25).path, 11u);
@@ -269,13 +269,6 @@ TEST(SurfaceSceneTest, DataAreInterpolatedAndPathsAreCounted) {
   EXPECT_NEAR(*data_at(6.5, 1).force, 6.5, 1e-5);  // After a point that occurs twice.
 }
 
-TEST(SurfaceSceneTest, NothingMeetsAnEmptyScene) {
-  const SurfaceScene scene({});
-  EXPECT_FALSE(scene.intersect({0, 0, 0}, {0, 0, 1}));
-  EXPECT_FALSE(scene.occluded({0, 0, 0}, {0, 0, 1}));
-  EXPECT_TRUE(scene.bounds().isEmpty());
-}
-
 /// Embree aborts the process on some rays; SurfaceScene must not pass them on.
 TEST(SurfaceSceneTest, RaysMayStartAnywhere) {
   const SurfaceScene scene({surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}))});
@@ -284,7 +277,7 @@ TEST(SurfaceSceneTest, RaysMayStartAnywhere) {
     EXPECT_NEAR(scene.intersect({0.3, 0.2, far}, down)->distance, far, 1e-6 + 1e-15 * far);
     EXPECT_TRUE(scene.occluded({0.3, 0.2, far}, down));
   }
-  const double nan = std::nan(""), infinite = std::numeric_limits<double>::infinity();
+  const double nan = std::nan("");
   for (const double far : {1e20, 1e40, 1e200, 1e300, infinite, nan})
     for (const Vector3d& from : {Vector3d(far, 0, 0), Vector3d(0.3, 0.2, far), Vector3d(far, -far, far)})
       for (const Vector3d& direction : {down, Vector3d(0.6, 0, -0.8), Vector3d(nan, 0, 1)}) {
@@ -298,27 +291,24 @@ TEST(SurfaceSceneTest, RaysMayStartAnywhere) {
 }
 
 TEST(SurfaceSceneTest, BadSurfacesAreNamed) {
-  const ShadedSurface good = surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}));
-  const auto error = [&](const ShadedSurface& bad) { return message([&] { SurfaceScene({good, bad}); }); };
-  ShadedSurface bad = good;
-  bad.forces = {1, 2};
-  EXPECT_EQ(error(bad), "surface 1: there must be no forces, or a finite one for each point");
-  bad = good;
-  std::get<TriangleMesh>(bad.shape).triangles.push_back({0, 1, 4});
-  EXPECT_EQ(error(bad), "surface 1: a triangle has a corner that is none of the vertices");
-  bad = good;
-  std::get<TriangleMesh>(bad.shape).vertices[0].x() = std::nan("");
-  EXPECT_EQ(error(bad), "surface 1: a vertex is not finite in single precision");
-  std::get<TriangleMesh>(bad.shape).vertices[0].x() = 1e39;
-  EXPECT_EQ(error(bad), "surface 1: a vertex is not finite in single precision");
-  bad = good;
-  bad.path_ends = {1};
-  EXPECT_EQ(error(bad), "surface 1: path_ends must ascend to the number of triangles");
-  bad = curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, -0.1f});
-  EXPECT_EQ(error(bad), "surface 1: a radius is not a finite value >= 0");
-  bad = curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, 0.1f});
-  std::get<RoundCurves>(bad.shape).strand_ends = {3};
-  EXPECT_EQ(error(bad), "surface 1: strand_ends must ascend to the number of points");
+  const ShadedSurface square = surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}));
+  ShadedSurface forces = square, index = square, paths = square, strands = curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, 0.1f});
+  forces.forces = {1, 2};
+  std::get<TriangleMesh>(index.shape).triangles.push_back({0, 1, 4});
+  paths.path_ends = {1};
+  std::get<RoundCurves>(strands.shape).strand_ends = {3};
+  std::vector<std::pair<ShadedSurface, std::string>> bad{
+      {forces, "there must be no forces, or a finite one for each point"},
+      {index, "a triangle has a corner that is none of the vertices"},
+      {paths, "path_ends must ascend to the number of triangles"},
+      {curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, -0.1f}), "a radius is not a finite value >= 0"},
+      {strands, "strand_ends must ascend to the number of points"}};
+  for (const double far : {std::nan(""), 1e39}) {
+    bad.emplace_back(square, "a vertex is not finite in single precision");
+    std::get<TriangleMesh>(bad.back().first.shape).vertices[0].x() = far;
+  }
+  for (const auto& [surface, error] : bad)
+    EXPECT_EQ(message([&, each = surface] { SurfaceScene({square, each}); }), "surface 1: " + error);
 }
 
 /// The same rays end there alone, together and on their way to a light.
@@ -347,25 +337,13 @@ TEST(SurfaceSceneTest, ATranslucentSurfaceIsMetByAPartOfTheRays) {
   }
 }
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
-
-class Random {
- public:
-  explicit Random(unsigned seed) : engine_(seed) {}
-  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine_); }
-  Vector3d point(double extent) {
-    return {uniform(-extent, extent), uniform(-extent, extent), uniform(-extent, extent)};
-  }
-
- private:
-  std::mt19937 engine_;
-};
-
-TriangleMesh soup(Random& random, std::uint32_t count, double triangle_size) {
+/// Triangles anywhere in [−½, ½]³. @param first  Number of the first random point; each triangle takes four.
+TriangleMesh soup(int first, std::uint32_t count, double triangle_size) {
   TriangleMesh mesh;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const Vector3d center = random.point(0.5);
-    for (int corner = 0; corner < 3; ++corner) mesh.vertices.push_back(center + random.point(triangle_size));
+    const int at = first + 4 * static_cast<int>(i);
+    for (const int corner : {1, 2, 3})
+      mesh.vertices.push_back(0.5 * random_point(at) + triangle_size * random_point(at + corner));
     mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
   }
   return mesh;
@@ -386,50 +364,38 @@ bool meets(const TriangleMesh& mesh, std::uint32_t triangle, const Vector3d& fro
   return inside >= 0;
 }
 
+/// All that a ray meets from `min_distance` on.
 std::vector<TriangleHit> brute_force(const std::vector<TriangleMesh>& meshes, const Vector3d& from,
-                                     const Vector3d& direction, double min_distance, double max_distance, bool& clear) {
+                                     const Vector3d& direction, double min_distance, bool& clear) {
   std::vector<TriangleHit> hits;
   for (std::uint32_t mesh = 0; mesh < meshes.size(); ++mesh)
     for (std::uint32_t triangle = 0; triangle < meshes[mesh].triangles.size(); ++triangle) {
       double distance = 0;
       if (!meets(meshes[mesh], triangle, from, direction, distance, clear)) continue;
-      if (std::min(std::abs(distance - min_distance), std::abs(distance - max_distance)) < 1e-4) clear = false;
-      if (distance >= min_distance && distance <= max_distance) hits.push_back({distance, mesh, triangle});
+      if (std::abs(distance - min_distance) < 1e-4) clear = false;
+      if (distance >= min_distance) hits.push_back({distance, mesh, triangle});
     }
   return hits;
 }
 
-struct Soup {
-  explicit Soup(unsigned seed) : random(seed) {
-    meshes = {soup(random, 400, 0.2), TriangleMesh(), soup(random, 300, 0.3)};
-  }
-  TriangleScene scene() const { return {{&meshes[0], &meshes[1], &meshes[2]}, Vector3d(0.1, 0, 0), 2}; }
+const std::vector<TriangleMesh> soups{soup(10000, 400, 0.2), TriangleMesh(), soup(20000, 300, 0.3)};
 
-  Random random;
-  std::vector<TriangleMesh> meshes;
-};
-
-/// Compares lists of hits or of ids.
-template <class A, class B>
-bool same(const A& a, const B& b) {
-  return a.mesh == b.mesh && a.triangle == b.triangle;
-}
+TriangleScene scene_of_soups() { return {{&soups[0], &soups[1], &soups[2]}, Vector3d(0.1, 0, 0), 2}; }
 
 TEST(TriangleScene, NearestAgreesWithBruteForce) {
-  Soup soup(2);
-  const TriangleScene scene = soup.scene();
+  const TriangleScene scene = scene_of_soups();
   int compared = 0;
   for (int i = 0; i < 2000; ++i) {
-    const Vector3d from = soup.random.point(1), direction = soup.random.point(1).normalized();
-    const double low = soup.random.uniform(-1, 0.2);
+    const Vector3d from = random_point(i), direction = random_direction(i);
+    const double low = 1.2 * random_uniform(9, i, 0) - 1;
     bool clear = true;
-    auto expected = brute_force(soup.meshes, from, direction, low, infinite, clear);
+    auto expected = brute_force(soups, from, direction, low, clear);
     std::sort(expected.begin(), expected.end(), [](const auto& a, const auto& b) { return a.distance < b.distance; });
     if (!clear || (expected.size() > 1 && expected[1].distance - expected[0].distance < 1e-4)) continue;
     const auto hit = scene.nearest(from, direction, low, infinite);
     ASSERT_EQ(hit.has_value(), !expected.empty());
     if (!hit) continue;
-    ASSERT_TRUE(same(*hit, expected[0]));
+    ASSERT_EQ(std::pair(hit->mesh, hit->triangle), std::pair(expected[0].mesh, expected[0].triangle));
     EXPECT_NEAR(hit->distance, expected[0].distance, 1e-4);
     ++compared;
   }
@@ -448,7 +414,9 @@ TEST(TriangleScene, NearReportsLongTrianglesOnce) {
   std::size_t found = 0;
   for (double x = 0; x < 4; x += 0.01) {
     scene.near({x, 0.3, 0.5}, 0.1, candidates);
-    EXPECT_EQ(std::adjacent_find(candidates.begin(), candidates.end(), same<TriangleId, TriangleId>), candidates.end());
+    std::set<std::uint32_t> triangles;
+    for (const TriangleId& id : candidates) triangles.insert(id.triangle);
+    EXPECT_EQ(triangles.size(), candidates.size());
     found += candidates.size();
   }
   EXPECT_GT(found, 0u);
@@ -488,19 +456,18 @@ TEST(TriangleScene, RaysMayStartAnywhere) {
 }
 
 TEST(TriangleScene, NearMissesNoBoxAndLeavesOutWhatIsFar) {
-  Soup soup(3);
-  const TriangleScene scene = soup.scene();
+  const TriangleScene scene = scene_of_soups();
   std::vector<TriangleId> candidates;
   std::size_t close = 0, proposed = 0;
   for (int i = 0; i < 500; ++i) {
-    const Vector3d point = soup.random.point(0.7);
-    const double radius = soup.random.uniform(1e-5, 0.05);
+    const Vector3d point = 0.7 * random_point(i);
+    const double radius = 1e-5 + 0.05 * random_uniform(9, i, 0);
     scene.near(point, radius, candidates);
     proposed += candidates.size();
-    for (std::uint32_t m = 0; m < soup.meshes.size(); ++m)
-      for (std::uint32_t t = 0; t < soup.meshes[m].triangles.size(); ++t) {
+    for (std::uint32_t m = 0; m < soups.size(); ++m)
+      for (std::uint32_t t = 0; t < soups[m].triangles.size(); ++t) {
         Eigen::AlignedBox3d box;
-        for (const std::uint32_t vertex : soup.meshes[m].triangles[t]) box.extend(soup.meshes[m].vertices[vertex]);
+        for (const std::uint32_t vertex : soups[m].triangles[t]) box.extend(soups[m].vertices[vertex]);
         if (box.exteriorDistance(point) > radius - 2e-6) continue;
         ++close;
         EXPECT_TRUE(std::any_of(candidates.begin(), candidates.end(),
@@ -512,6 +479,10 @@ TEST(TriangleScene, NearMissesNoBoxAndLeavesOutWhatIsFar) {
 }
 
 TEST(TriangleScene, NothingIsFoundWhereThereAreNoTriangles) {
+  const SurfaceScene empty({});
+  EXPECT_FALSE(empty.intersect({0, 0, 0}, {0, 0, 1}));
+  EXPECT_FALSE(empty.occluded({0, 0, 0}, {0, 0, 1}));
+  EXPECT_TRUE(empty.bounds().isEmpty());
   const TriangleMesh none;
   for (const auto& meshes : {std::vector<const TriangleMesh*>{}, std::vector<const TriangleMesh*>{&none, &none}}) {
     const TriangleScene scene(meshes, Vector3d::Zero(), 1);

@@ -85,13 +85,6 @@ Edges edges_of(const TriangleMesh& mesh) {
   return result;
 }
 
-void expect_watertight(const TriangleMesh& mesh, int characteristic) {
-  const Edges edges = edges_of(mesh);
-  EXPECT_EQ(edges.unbalanced, 0);
-  EXPECT_EQ(edges.not_twice, 0);
-  EXPECT_EQ(edges.characteristic, characteristic);
-}
-
 /// Each vertex has a unit normal that points outwards, as its triangles do.
 void expect_normals_outwards(const TubeMesh& tubes) {
   ASSERT_EQ(tubes.normals.size(), tubes.mesh.vertices.size());
@@ -105,6 +98,14 @@ void expect_normals_outwards(const TubeMesh& tubes) {
   }
 }
 
+void expect_watertight(const TubeMesh& tubes, int characteristic) {
+  const Edges edges = edges_of(tubes.mesh);
+  EXPECT_EQ(edges.unbalanced, 0);
+  EXPECT_EQ(edges.not_twice, 0);
+  EXPECT_EQ(edges.characteristic, characteristic);
+  expect_normals_outwards(tubes);
+}
+
 TEST(TubeMesh, AStraightTubeHasItsVolume) {
   for (const double tolerance : {0.1, 0.01, 0.001}) {
     const double a = 0.5, b = 0.2, length = 3;
@@ -116,8 +117,7 @@ TEST(TubeMesh, AStraightTubeHasItsVolume) {
     // Two triangles per side of the only segment, and the fans of the caps; the value is linear along it, so two rings
     // suffice.
     EXPECT_EQ(tubes.mesh.triangles.size(), std::size_t(2 * n + 2 * (n - 2)));
-    expect_watertight(tubes.mesh, 2);
-    expect_normals_outwards(tubes);
+    expect_watertight(tubes, 2);
   }
 }
 
@@ -125,8 +125,7 @@ TEST(TubeMesh, CurvedAndTwistedTubesAreWatertight) {
   for (const Tube& tube : {twisted_tube(), arc(0.2, 2, 5), straight_tube(1, 0.1, 2, 3)})
     for (const TubeCaps caps : {TubeCaps::flat, TubeCaps::round}) {
       const TubeMesh tubes = solid(tube, caps);
-      expect_watertight(tubes.mesh, 2);
-      expect_normals_outwards(tubes);
+      expect_watertight(tubes, 2);
       EXPECT_GT(volume(tubes.mesh), 0);
     }
   EXPECT_GT(edges_of(solid(twisted_tube(), TubeCaps::open).mesh).not_twice, 0);
@@ -232,8 +231,7 @@ TEST(TubeMesh, WiresAreHoopsAndLines) {
   settings.lines = 0;
   const Tube tube = straight_tube(0.3, 0.2, 2, 2);
   const TubeMesh hoops = make_tube_mesh({tube}, settings);
-  expect_watertight(hoops.mesh, 0);  // Five tori.
-  expect_normals_outwards(hoops);
+  expect_watertight(hoops, 0);  // Five tori.
   const double h = std::pow((0.3 - 0.2) / (0.3 + 0.2), 2);
   const double perimeter = pi * (0.3 + 0.2) * (1 + 3 * h / (10 + std::sqrt(4 - 3 * h)));  // Ramanujan 1914.
   // A hexagon, the coarsest polygon, has 0.83 of the area of its circle.
@@ -242,8 +240,7 @@ TEST(TubeMesh, WiresAreHoopsAndLines) {
 
   settings.lines = 4;
   const TubeMesh both = make_tube_mesh({tube}, settings);
-  expect_watertight(both.mesh, 8);
-  expect_normals_outwards(both);
+  expect_watertight(both, 8);
   EXPECT_LT(volume(both.mesh) - volume(hoops.mesh), 4 * 2 * pi * 1e-4);
   EXPECT_GT(volume(both.mesh) - volume(hoops.mesh), 0.8 * 4 * 2 * pi * 1e-4);
   for (const Vector3d& p : both.mesh.vertices) {
@@ -260,8 +257,7 @@ TEST(TubeMesh, DiscsAreSeparateEllipses) {
   settings.thickness = 0.02;
   settings.max_segments = 200;
   const TubeMesh discs = make_tube_mesh({straight_tube(0.3, 0.2, 2, 3)}, settings);
-  expect_watertight(discs.mesh, 2 * 5);
-  expect_normals_outwards(discs);
+  expect_watertight(discs, 2 * 5);
   EXPECT_NEAR(volume(discs.mesh), 5 * pi * 0.3 * 0.2 * 0.02, 5 * 2 * pi * 0.3 * 0.02 * 1e-4);
   for (std::size_t i = 0; i < discs.values.size(); ++i)
     EXPECT_NEAR(discs.values[i], discs.mesh.vertices[i].z() / 2, 0.0051);

@@ -70,7 +70,6 @@ TEST(WorkFileTest, FilesAreTheSameBySizeTimeAndHash) {
   EXPECT_NE(difference(right_work().origin, with(large)), "");
 }
 
-/// Every byte that is missing or changed.
 TEST(WorkFileTest, WhatIsDamagedIsRefused) {
   const TemporaryFolder folder;
   const std::filesystem::path file = folder / "a.shard";

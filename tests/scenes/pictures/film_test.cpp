@@ -8,8 +8,6 @@
 namespace tensorray {
 namespace {
 
-using Eigen::Vector3d;
-
 class FilmScene : public Pictures {
  protected:
   /// A quad across z at −2, with u along x and v along y, in a scene in which light is straight. @param more  Of it.
@@ -38,6 +36,15 @@ class FilmScene : public Pictures {
       const std::vector<float> first = channel(a, name), second = channel(b, name);
       for (std::size_t i = 0; i < first.size(); ++i) ASSERT_NEAR(first[i], second[i], tolerance) << name << i;
     }
+  }
+
+  /// A wall behind everything.
+  const std::string wall_ = R"(objects=[{"plate":{"center":[0,0,-2],"size":[8,8]},"material":{"kind":"diffuse"}}])";
+
+  /// The changes, and a field so weak that light hardly bends.
+  static Settings weakened(Settings settings) {
+    settings.insert(settings.end(), {"bending.a=0.75", "field.scale=1e-7"});
+    return settings;
   }
 
   /// A vector of a scene, with z or y up.
@@ -143,13 +150,9 @@ TEST_F(FilmScene, MeshesHavePictures) {
 /// Where a field is too weak to be seen, so is the edge of the light that comes through it.
 TEST_F(FilmScene, TheLightsEdgeHasNoSeam) {
   write_quad("\"smooth_angle\": 0");
-  const Settings wall{R"(objects=[{"plate":{"center":[0,0,-2],"size":[8,8]},"material":{"kind":"diffuse"}}])",
-                      "camera.height=5", "lights.0.direction=[0.3,0.2,-1]", "integrator.max_samples=16",
+  const Settings wall{wall_, "camera.height=5", "lights.0.direction=[0.3,0.2,-1]", "integrator.max_samples=16",
                       "integrator.caustic.resolution=48"};
-  const Image without = render(wall);
-  Settings weak = wall;
-  weak.insert(weak.end(), {"bending.a=0.75", "field.scale=1e-7"});
-  const Image with = render(weak);
+  const Image without = render(wall), with = render(weakened(wall));
   EXPECT_GT(mean(with, "caustic.G"), 0.01);
   expect_near(with, without, 2e-3);
 }
@@ -160,9 +163,8 @@ TEST_F(FilmScene, TheDisksLightHasNoSeam) {
   write("quad.obj",
         "v -4 -4 -1.3\nv 0 -4 -1.3\nv 0 4 -1.3\nv -4 4 -1.3\nv 0 -4 -5\nv 4 -4 -5\nv 4 4 -5\nv 0 4 -5\n"
         "f 1 2 3 4\nf 5 6 7 8\n");
-  const std::string mesh = R"(objects=[{"file":"quad.obj","material":{"kind":"diffuse"}}])",
-                    plate = R"(objects=[{"plate":{"center":[0,0,-2],"size":[8,8]},"material":{"kind":"diffuse"}}])";
-  for (const auto& [object, direction] : {std::pair(mesh, "[0,0,-1]"), {plate, "[0,0,-1]"}, {plate, "[1,0,-0.1]"}}) {
+  const std::string mesh = R"(objects=[{"file":"quad.obj","material":{"kind":"diffuse"}}])";
+  for (const auto& [object, direction] : {std::pair(mesh, "[0,0,-1]"), {wall_, "[0,0,-1]"}, {wall_, "[1,0,-0.1]"}}) {
     const Settings sun{object,
                        "camera.height=6",
                        std::string("lights.0.direction=") + direction,
@@ -170,17 +172,14 @@ TEST_F(FilmScene, TheDisksLightHasNoSeam) {
                        "integrator.max_samples=64",
                        "integrator.min_samples=64",
                        "integrator.noise=0"};
-    const Image without = render(sun);
-    Settings weak = sun;
-    weak.insert(weak.end(), {"bending.a=0.75", "field.scale=1e-7"});
-    const Image with = render(weak);
+    const Image without = render(sun), with = render(weakened(sun));
     EXPECT_NEAR(mean(with, "G"), mean(without, "G"), 0.02 * mean(without, "G")) << object << direction;
   }
 }
 
 TEST_F(FilmScene, GroupsAtTheLightsEdgeAreFinite) {
   write_quad("\"smooth_angle\": 0");
-  render({R"(objects=[{"plate":{"center":[0,0,-2],"size":[8,8]},"material":{"kind":"diffuse"}}])",
+  render({wall_,
           R"(lights=[{"kind":"directional","direction":[0.3,0.2,-1],"angle":0.53,"group":"sun"},
                      {"kind":"constant","strength":0.0005,"group":"sky"}])",
           "camera.height=5", "bending.a=0.75", "field.scale=1e-7"});

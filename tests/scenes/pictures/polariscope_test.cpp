@@ -1,11 +1,7 @@
 // The method polariscope: polarised light through a field, between polarisers.
 
-#include <cmath>
-
-#include <Eigen/Core>
 #include <Eigen/LU>
 #include <fmt/format.h>
-#include <gmock/gmock.h>
 
 #include "base/constants.h"
 #include "scenes/outputs/picture_outputs.h"
@@ -14,10 +10,6 @@
 
 namespace tensorray {
 namespace {
-
-using namespace test;
-using ::testing::Contains;
-using ::testing::HasSubstr;
 
 /// A plate 0.01 thick with a stress of 8e6 along x: 4.4 µm of retardance with C = 55e-12.
 constexpr const char* plate_scene = R"({
@@ -31,18 +23,17 @@ class Polariscope : public Pictures {
  protected:
   void SetUp() override { write("scene.json", plate_scene); }
 
-  /// Thickness of the plate, world units.
-  double thickness() { return channel(render({}), "length")[0]; }
+  /// The coefficient with which the plate has a retardance.
+  double coefficient(double nanometres) { return nanometres * 1e-9 / (8e6 * channel(render({}), "length")[0]); }
 };
 
 /// The interference-colour chart: XYZ of sin² times the illuminant, 1 nm at a time.
 TEST_F(Polariscope, ColoursAreThoseOfTheInterferenceChart) {
-  const double h = thickness();
   const Spectrum light = illuminant("D65");
   for (const double retardance : {250.0, 551.0, 1100.0, 1700.0}) {
-    const double C = retardance * 1e-9 / (8e6 * h);
-    const Image image = render({fmt::format("integrator.stress_optic={}", C), "output.white_balance=false",
-                                "light.wavelengths.count=400", "integrator.arrangement=plane"});
+    const Image image =
+        render({fmt::format("integrator.stress_optic={}", coefficient(retardance)), "output.white_balance=false",
+                "light.wavelengths.count=400", "integrator.arrangement=plane"});
     Eigen::Vector3d xyz = Eigen::Vector3d::Zero();
     double white = 0;
     for (double wavelength = 380.5; wavelength < 780; ++wavelength) {
@@ -57,19 +48,17 @@ TEST_F(Polariscope, ColoursAreThoseOfTheInterferenceChart) {
 }
 
 TEST_F(Polariscope, ChannelsAreRetardanceAndDirections) {
-  const double h = thickness();
   // 0.3 and 1.7 orders of 545 nm, the middle of the band nearest to 550 nm: the principal value is below half an order,
   // and then the slow axis is the other one.
   for (const auto& [orders, wrapped, azimuth] : {std::tuple(0.3, 0.3, 0.0), std::tuple(1.7, 0.3, pi / 2)}) {
-    const double C = orders * 545e-9 / (8e6 * h);
-    const Image image = render({fmt::format("integrator.stress_optic={}", C)});
+    const Image image = render({fmt::format("integrator.stress_optic={}", coefficient(545 * orders))});
     EXPECT_NEAR(channel(image, "integral")[0], orders * 545, 0.01);
     EXPECT_NEAR(channel(image, "retardance")[0], wrapped * 545, 0.01);
     EXPECT_NEAR(std::abs(channel(image, "azimuth")[0]), azimuth, 1e-4);
     EXPECT_NEAR(std::abs(channel(image, "rotation")[0]), 0, 1e-4);
   }
   // A negative coefficient: the slow axis is across the stress.
-  const Image image = render({fmt::format("integrator.stress_optic={}", -0.3 * 545e-9 / (8e6 * h))});
+  const Image image = render({fmt::format("integrator.stress_optic={}", coefficient(-0.3 * 545))});
   EXPECT_NEAR(std::abs(channel(image, "azimuth")[0]), pi / 2, 1e-4);
 }
 
@@ -96,8 +85,7 @@ TEST_F(Polariscope, AutomaticCoefficientGivesFourOrders) {
 
 /// Retardance by a table of coefficients: 10% more at 380 nm.
 TEST_F(Polariscope, DispersionComesFromAFile) {
-  const double h = thickness();
-  const double C = 800e-9 / (8e6 * h);
+  const double C = coefficient(800);
   write("glass.txt", fmt::format("# nm, 1/Pa\n380 {}\n555 {}\n780 {}\n", 1.1 * C, C, 0.95 * C));
   const Render seen =
       render_all({"integrator.stress_optic=glass.txt", "integrator.arrangement=plane"}, {"a.exr", "a.spectral.exr"});
@@ -146,8 +134,8 @@ TEST_F(Polariscope, ListsOfElementsAreAnArrangement) {
   const Image open = render(
       {R"(integrator.arrangement={"before":[{"polarizer":0},{"retarder":700,"axis":10}],"after":[{"retarder":700,"axis":100},{"polarizer":0}]})",
        "field.generate.tensor=[[0,0,0],[0,0,0],[0,0,0]]"});
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(open.pixel(0, 0)[c], 1, 1e-4);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(render({R"(integrator.arrangement={"before":[]})"}).pixel(0, 0)[c], 1, 1e-4);
+  for (const Image& image : {open, render({R"(integrator.arrangement={"before":[]})"})})
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(image.pixel(0, 0)[c], 1, 1e-4);
 }
 
 /// Beside the field, dark field is black and light field is white; also where the field is an annotation's ground.
@@ -217,7 +205,6 @@ TEST_F(Polariscope, TheAnalyserTurnsWithoutTracingAgain) {
     EXPECT_EQ(render_with({setting}, kept), render_with({setting}, nullptr)) << setting;
 }
 
-/// Compressive and tensile stress are not the same: eigenvalues stay as they are.
 TEST_F(Polariscope, SignsOfStressesCount) {
   const std::string tensor = "field.generate.tensor=[[4e6,0,0],[0,-4e6,0],[0,0,0]]";
   const Image image = render({tensor});
@@ -228,7 +215,6 @@ TEST_F(Polariscope, SignsOfStressesCount) {
   EXPECT_THAT(notes_, Contains(HasSubstr("/field/scale")));
 }
 
-/// Keys without an effect are named.
 TEST_F(Polariscope, SaysWhichKeysHaveNoEffect) {
   const std::vector<std::pair<Settings, std::string>> cases{
       {{R"(integrator.arrangement={"before":[{"polarizer":0}]})", "integrator.analyzer=10"}, "`/integrator/analyzer`"},

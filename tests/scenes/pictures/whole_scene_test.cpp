@@ -1,7 +1,5 @@
 // The method "scene": surfaces in light that a field bends, seen through the field.
 
-#include <utility>
-
 #include <fmt/core.h>
 
 #include "tests/scenes/pictures/pictures.h"
@@ -57,7 +55,6 @@ TEST_F(WholeScene, HasTheSameBytesOnAnyNumberOfThreads) {
 
 TEST_F(WholeScene, BendsWhatTheCameraSeesAndTheSunsLight) {
   const Image image = render({});
-  for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
   EXPECT_GT(mean(image, "deflection"), 0.01);
   EXPECT_GT(mean(image, "caustic.G"), 0.01);
   EXPECT_NEAR(mean(image, "caustic.G") + mean(image, "straight.G"), mean(image, "G"), 1e-4);
@@ -65,16 +62,14 @@ TEST_F(WholeScene, BendsWhatTheCameraSeesAndTheSunsLight) {
 
 /// A field that bends nothing, of either kind, gives the picture of the straight path tracer, bit for bit.
 TEST_F(WholeScene, AnIsotropicFieldIsNotThere) {
-  const std::string grid =
-      "field.generate={\"kind\":\"constant\",\"resolution\":9,\"tensor\":[[{0},0,0],[0,{0},0],[0,0,{0}]]}";
   std::vector<Image> images;
-  for (const char* value : {"0", "3.7"}) {
-    std::string set = grid;
-    for (std::size_t at; (at = set.find("{0}")) != std::string::npos;) set.replace(at, 3, value);
-    images.push_back(render({set, "field.scale=1", "field.eigenvalues=raw"}));
+  for (const double value : {0.0, 3.7}) {
+    const std::string tensor = fmt::format("[[{0},0,0],[0,{0},0],[0,0,{0}]]", value);
+    images.push_back(render({R"(field.generate={"kind":"constant","resolution":9,"tensor":)" + tensor + "}",
+                             "field.scale=1", "field.eigenvalues=raw"}));
   }
   EXPECT_EQ(images[0].pixels, images[1].pixels);
-  EXPECT_EQ(mean(images[0], "R") > 0.05, true);
+  EXPECT_GT(mean(images[0], "R"), 0.05);
 }
 
 /// Light that hardly bends must give that picture, too, though it is found in other ways: the sun by its flow map, the
@@ -95,7 +90,6 @@ TEST_F(WholeScene, PathsAreObjects) {
   expect_error(2, "`/integrator/style`", {"objects=[{\"paths\":{}}]", "integrator.style=lines"});
 }
 
-/// In an even sky, conserved radiance makes the volume invisible; conserved power does not.
 TEST_F(WholeScene, AnEvenSkyThroughTheFieldIsEvenIfRadianceIsConserved) {
   const Settings sky{"lights=[{\"kind\":\"constant\"}]", "integrator.max_depth=1",
                      "objects=[{\"plate\":{\"center\":[0,0,-50],\"size\":[0.01,0.01]}}]", "camera.position=[0,-6,0]",
@@ -114,16 +108,15 @@ TEST_F(WholeScene, AnEvenSkyThroughTheFieldIsEvenIfRadianceIsConserved) {
 }
 
 TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
-  write("scene.json", R"({
-    "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "absolute"},
-    "integrator": {"type": "scene", "max_samples": 8, "min_samples": 8, "noise": 0,
-                   "caustic": {"resolution": 64, "rays": 4000, "passes": 1}},
-    "camera": {"resolution": [40, 32]},
-    "lights": [{"kind": "constant", "color": [0.2, 0.3, 0.6], "group": "around"},
+  const auto lit = [&](Settings changes) {
+    changes.insert(changes.begin(), {"integrator.max_samples=8", "integrator.min_samples=8",
+                                     R"(lights=[{"kind": "constant", "color": [0.2, 0.3, 0.6], "group": "around"},
                {"kind": "directional", "direction": [0.2, 0, -1], "angle": 2, "group": "sun"},
                {"kind": "point", "position": [1, 1, 3], "strength": 5, "group": "lamps"},
-               {"kind": "area", "center": [-1, 0, 3], "group": "lamps"}]})");
-  const Image photons = render({"lights.1.caustic=photons", "lights.2.caustic=photons"}), all = render({});
+               {"kind": "area", "center": [-1, 0, 3], "group": "lamps"}])"});
+    return render(changes);
+  };
+  const Image photons = lit({"lights.1.caustic=photons", "lights.2.caustic=photons"}), all = lit({});
   for (const std::string color : {"sun.G", "lamps.G"})
     EXPECT_NEAR(mean(photons, color), mean(all, color), 0.03 * mean(all, color)) << color;
   for (const char* color : {"R", "G", "B"}) {
@@ -136,7 +129,7 @@ TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
   }
   EXPECT_GE(mean(all, "folds"), 0.05);
   // A group has the light that the picture has if all others are dark.
-  const Image sun = render({"lights.0.strength=0", "lights.2.strength=0", "lights.3.strength=0"});
+  const Image sun = lit({"lights.0.strength=0", "lights.2.strength=0", "lights.3.strength=0"});
   EXPECT_NEAR(mean(all, "sun.G"), mean(sun, "G"), 0.1 * mean(sun, "G"));
 }
 
@@ -200,13 +193,10 @@ TEST_F(WholeScene, OddPlacesGiveAPicture) {
            {"camera.position=[0,-3,0.4]", "camera.target=[0,0,0]", "camera.angle=3"},
            {"obstacles=[{\"file\":\"body.ply\"}]",
             "lights=[{\"kind\":\"constant\"},{\"kind\":\"point\",\"position\":[0,0,-2.5]}]"}}) {
-    const Image image = render(sets);
-    for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value)) << sets[0];
-    EXPECT_GT(mean(image, "A"), 0.99) << sets[0];
+    EXPECT_GT(mean(render(sets), "A"), 0.99) << sets[0];  // It expects finite values.
   }
 }
 
-// The method "scene": the light of suns, points and lamps, as maps, photons and paths find it.
 /// A plate below a bending field, in the light of nine points (`first`) or of a lamp (`second`): a square of 3 × 3 with
 /// the intensity π 100. The lamp is darker by 1% towards the edges.
 /// @param integrator  More keys of the integrator.
@@ -228,7 +218,6 @@ std::pair<std::string, std::string> points_and_lamp(const std::string& integrato
           common + R"({"kind": "area", "center": [0, 0, 12], "size": [3, 3], "strength": 34.907}]})"};
 }
 
-/// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
 TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   const auto [points, lamp] =
       points_and_lamp(R"("max_samples": 128, "min_samples": 128, "caustic": {"resolution": 256, "rays": 20000})");
