@@ -21,7 +21,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double nan_value = NAN, infinite = INFINITY;
+constexpr double not_a_number = NAN, infinite = INFINITY;
 
 /// @param text  A part of the error.
 template <class Action>
@@ -53,19 +53,19 @@ TEST(Refusals, OfCharts) {
   refused("range", [&] { draw_color_bar(image, {"title", {1, 0}, red}); });
   refused("percentiles", [] { choose_range({1}, {50, 50, false, false}); });
   refused("percentiles", [] { choose_range({1}, {-1, 50, false, false}); });
-  refused("percentiles", [] { choose_range({1}, {0, nan_value, false, false}); });
+  refused("percentiles", [] { choose_range({1}, {0, not_a_number, false, false}); });
   refused("symmetric", [] { choose_range({1}, {0, 100, true, true}); });
   refused("R, G, B", [&] { draw_grid_lines(grey, std::vector<PixelCoordinates>(16), {}); });
   refused("coordinates", [&] { draw_grid_lines(image, std::vector<PixelCoordinates>(12), {}); });
   refused("cell", [&] { lines({0, 4}, 1, 1); });
   refused("width", [&] { lines({4, 4}, -1, 1); });
-  refused("width", [&] { lines({4, 4}, nan_value, 1); });
+  refused("width", [&] { lines({4, 4}, not_a_number, 1); });
   refused("opacity", [&] { lines({4, 4}, 1, 1.5); });
-  refused("opacity", [&] { lines({4, 4}, 1, nan_value); });
+  refused("opacity", [&] { lines({4, 4}, 1, not_a_number); });
   refused("height", [&] { letter(1, 0); });
-  refused("height", [&] { letter(1, nan_value); });
+  refused("height", [&] { letter(1, not_a_number); });
   refused("height", [&] { letter(1, infinite); });
-  refused("position", [&] { letter(nan_value, 5); });
+  refused("position", [&] { letter(not_a_number, 5); });
   refused("position", [&] { letter(infinite, 5); });
 }
 
@@ -88,7 +88,7 @@ TEST(Refusals, OfPlatesAndPictures) {
   refused("65000", [] { DensityEstimator(65001, 1, 1, {}); });
   refused("colour", [] { DensityEstimator(5, 5, 2, {}, {{1, 1, 1}}); });
   refused("tau", [&] { tau(0); });
-  refused("tau", [&] { tau(nan_value); });
+  refused("tau", [&] { tau(not_a_number); });
   refused("pixels", [&] { sky([](EnvironmentLight& light) { light.picture = {}; }); });
   refused("pixels", [&] { sky([](EnvironmentLight& light) { light.picture.pixels.pop_back(); }); });
   refused("spectrum", [&] { sky([](EnvironmentLight& light) { light.channel_spectra.resize(1, 2); }); });
@@ -98,7 +98,7 @@ TEST(Refusals, OfPlatesAndPictures) {
   refused("rotation", [&] { sky([](EnvironmentLight& light) { light.to_world *= 2; }); });
   refused("one value", [] { Distribution1D({}); });
   refused("negative", [] { Distribution1D({1, -1}); });
-  refused("negative", [] { Distribution1D({1, nan_value}); });
+  refused("negative", [] { Distribution1D({1, not_a_number}); });
   refused("finite", [] { Distribution1D({1e308, 1e308}); });
   refused("cells", [] { Distribution2D({1, 2, 3}, 2, 2); });
   refused("cells", [] { Distribution2D({}, 0, 0); });
@@ -118,16 +118,16 @@ TEST(Refusals, OfCameras) {
     frame_points(points, settings);
   };
   refused("two points", [&] { look({1, 2, 3}, up, 40, 10); });
-  refused("finite", [&] { look({1, 2, nan_value}, up, 40, 10); });
-  refused("up", [&] { look({0, 0, 0}, {0, nan_value, 0}, 40, 10); });
+  refused("finite", [&] { look({1, 2, not_a_number}, up, 40, 10); });
+  refused("up", [&] { look({0, 0, 0}, {0, not_a_number, 0}, 40, 10); });
   refused("angle", [&] { look({0, 0, 0}, up, 0, 10); });
   refused("angle", [&] { look({0, 0, 0}, up, 180, 10); });
-  refused("angle", [&] { look({0, 0, 0}, up, nan_value, 10); });
+  refused("angle", [&] { look({0, 0, 0}, up, not_a_number, 10); });
   refused("resolution", [&] { look({0, 0, 0}, up, 40, 0); });
   refused("height", [&] { orthographic_camera({0, 0, 0}, {1, 2, 3}, up, 0, {10, 10}); });
   refused("height", [&] { orthographic_camera({0, 0, 0}, {1, 2, 3}, up, infinite, {10, 10}); });
   refused("nothing", [&] { framing({}, 0, up); });
-  refused("finite", [&] { framing({{0, 0, 0}, {1, nan_value, 0}}, 0, up); });
+  refused("finite", [&] { framing({{0, 0, 0}, {1, not_a_number, 0}}, 0, up); });
   refused("margin", [&] { framing({{0, 0, 0}}, 0.5, up); });
   refused("direction", [&] { framing({{0, 0, 0}}, 0, Vector3d::Zero()); });
 }
@@ -146,7 +146,7 @@ TEST(Refusals, OfLightAndMatter) {
   };
   const auto bands = [](double low, double high, int count) { make_bands(illuminant("D65"), low, high, count); };
   refused("lengths", [&] { tubes([](TubeSettings& s) { s.tolerance = -1; }); });
-  refused("lengths", [&] { tubes([](TubeSettings& s) { s.spacing = nan_value; }); });
+  refused("lengths", [&] { tubes([](TubeSettings& s) { s.spacing = not_a_number; }); });
   refused("3 segments", [&] { tubes([](TubeSettings& s) { s.min_segments = 2; }); });
   refused("segments", [&] { tubes([](TubeSettings& s) { s.max_segments = 5; }); });
   refused("lines", [&] { tubes([](TubeSettings& s) { s.lines = -1; }); });
@@ -161,7 +161,7 @@ TEST(Refusals, OfLightAndMatter) {
   refused("negative", [&] { mirror(0.2, one, -one, one); });
   refused("of k", [&] { mirror(0.2, one, BandValues::Ones(2), one); });
   refused("index", [&] { make_material(RoughDielectric{0.1, 1}, one); });
-  refused("roughness", [&] { make_material(RoughDielectric{nan_value, 1.5}, one); });
+  refused("roughness", [&] { make_material(RoughDielectric{not_a_number, 1.5}, one); });
   refused("metallic", [&] { make_material(Principled{2, 0.5, 0.5, 0, 0}, one); });
   refused("specular", [&] { make_material(Principled{0, 0.5, -1, 0, 0}, one); });
   refused("clearcoat", [&] { make_material(Principled{0, 0.5, 0.5, 3, 0}, one); });
@@ -171,7 +171,7 @@ TEST(Refusals, OfLightAndMatter) {
   refused("at least 1", [&] { bands(400, 700, 0); });
   refused("700 to 400", [&] { bands(700, 400, 8); });
   refused("-1 to 400", [&] { bands(-1, 400, 8); });
-  refused("min <= max", [&] { bands(500, nan_value, 8); });
+  refused("min <= max", [&] { bands(500, not_a_number, 8); });
   refused("550 nm", [&] { bands(550, 550, 8); });
   refused("no power between 900 and 1000 nm", [&] { bands(900, 1000, 8); });
   refused("no visible power between 310 and 340 nm", [&] { bands(310, 340, 8); });

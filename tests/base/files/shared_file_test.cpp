@@ -18,7 +18,7 @@ namespace {
 
 const std::string bytes = "bytes of a file";
 
-std::string bytes_of(const Descriptor& file) {
+std::string bytes_in(const Descriptor& file) {
   std::string read(bytes.size(), '\0');
   return read_whole_at(file.get(), read.data(), read.size(), 0) ? read : "";
 }
@@ -70,9 +70,9 @@ TEST_F(SharedFiles, AreFoundWhileAProcessHasThem) {
     SharedFile first("key", nothing_);
     EXPECT_FALSE(first.file().is_open());
     first.offer(file);
-    EXPECT_TRUE(ended_well(start([&] { return bytes_of(SharedFile("key", nothing_).file()) == bytes; })));
+    EXPECT_TRUE(ended_well(start([&] { return bytes_in(SharedFile("key", nothing_).file()) == bytes; })));
     EXPECT_FALSE(SharedFile("other", nothing_).file().is_open());
-    EXPECT_EQ(bytes_of(SharedFile("key", nothing_).file()), bytes) << "in the same process";
+    EXPECT_EQ(bytes_in(SharedFile("key", nothing_).file()), bytes) << "in the same process";
   }
   EXPECT_TRUE(is_empty());
   EXPECT_FALSE(SharedFile("key", nothing_).file().is_open());
@@ -82,7 +82,7 @@ TEST_F(SharedFiles, AreFoundWhileAProcessHasThem) {
 TEST_F(SharedFiles, AreWaitedFor) {
   const Descriptor file = whole_file();
   SharedFile first("key", nothing_);
-  const pid_t second = start([&] { return bytes_of(SharedFile("key", [&] { tell(); }).file()) == bytes; });
+  const pid_t second = start([&] { return bytes_in(SharedFile("key", [&] { tell(); }).file()) == bytes; });
   await(told_);  // It waits.
   first.offer(file);
   EXPECT_TRUE(ended_well(second));
@@ -99,7 +99,7 @@ TEST_F(SharedFiles, EndWithTheProcessThatMadeThem) {
   first->offer(whole_file());
   const SharedFile found("key", nothing_);
   first.reset();
-  EXPECT_EQ(bytes_of(found.file()), bytes);
+  EXPECT_EQ(bytes_in(found.file()), bytes);
   EXPECT_TRUE(is_empty());
   EXPECT_FALSE(SharedFile("key", nothing_).file().is_open());
 }
@@ -119,7 +119,7 @@ TEST_F(SharedFiles, AreMadeAgainIfTheirProcessIsKilled) {
     SharedFile second("key", nothing_);
     EXPECT_FALSE(second.file().is_open());
     second.offer(whole_file());
-    EXPECT_EQ(bytes_of(SharedFile("key", nothing_).file()), bytes);
+    EXPECT_EQ(bytes_in(SharedFile("key", nothing_).file()), bytes);
   }
   EXPECT_TRUE(is_empty());
 }

@@ -18,7 +18,7 @@ namespace tensorray {
 namespace {
 
 using namespace mesh_fixtures;
-using Path = std::filesystem::path;
+using FilePath = std::filesystem::path;
 
 /// Of the nodes of a row of unit cubes from x = first on.
 std::vector<double> coordinates(int nodes, int axis, int first = 0) {
@@ -29,7 +29,7 @@ std::vector<double> coordinates(int nodes, int axis, int first = 0) {
 
 /// A row of unit cubes from x = first on. At step k from 1 on, the gradient of v is k diag(1, 2, 3), and the stress of
 /// all cells is k (11, 22, 33, 12, 23, 13). @param mode  EX_LARGE_MODEL or EX_NETCDF4.
-void write_bar(const Path& path, int steps, int mode = EX_LARGE_MODEL, int first = 0, int cubes = 2) {
+void write_bar(const FilePath& path, int steps, int mode = EX_LARGE_MODEL, int first = 0, int cubes = 2) {
   int word = 8, stored = 8;
   const int file = ex_create(path.c_str(), EX_CLOBBER | mode, &word, &stored), nodes = 4 * (cubes + 1);
   ASSERT_GE(file, 0);
@@ -63,7 +63,7 @@ void write_bar(const Path& path, int steps, int mode = EX_LARGE_MODEL, int first
   ex_close(file);
 }
 
-void change(const Path& path, const std::function<void(int)>& act) {
+void change(const FilePath& path, const std::function<void(int)>& act) {
   int file = 0;
   ASSERT_EQ(nc_open(path.c_str(), NC_WRITE, &file), NC_NOERR);
   act(file);
@@ -71,7 +71,7 @@ void change(const Path& path, const std::function<void(int)>& act) {
 }
 
 /// Writes a value to all numbers of a variable at a step, from 1 on.
-void fill(const Path& path, const std::string& name, std::size_t step, double value = NC_FILL_DOUBLE) {
+void fill(const FilePath& path, const std::string& name, std::size_t step, double value = NC_FILL_DOUBLE) {
   change(path, [&](int file) {
     int id = -1, rank = 0, dimensions[8];
     ASSERT_EQ(nc_inq_varid(file, name.c_str(), &id), NC_NOERR) << name;
@@ -87,7 +87,7 @@ void fill(const Path& path, const std::string& name, std::size_t step, double va
   });
 }
 
-void set_aside(const Path& path, const std::string& name) {
+void set_aside(const FilePath& path, const std::string& name) {
   change(path, [&](int file) {
     int id = -1;
     nc_redef(file);
@@ -97,21 +97,21 @@ void set_aside(const Path& path, const std::string& name) {
 }
 
 /// Imports pieces of one mesh with voxels of 1/2.
-Imported import(const std::vector<Path>& files, const std::string& array, Take take, std::optional<int> step = {}) {
+Imported import(const std::vector<FilePath>& files, const std::string& array, Take take, std::optional<int> step = {}) {
   ImportSettings settings = array_settings(array, take, 0.5);
   settings.files = files;
   settings.step = step;
   return imported(settings);
 }
 
-std::string refusal(const Path& path, const char* array, Take take) {
+std::string refusal(const FilePath& path, const char* array, Take take) {
   return message([&] { import({path}, array, take); });
 }
 
 const char* const stress_list = "s_xx,s_yy,s_zz,s_xy,s_yz,s_xz";
 
 /// Expects v and the stress of a step, from 1 on. @return the notes.
-std::string expect_step(const Path& path, int step, std::optional<int> asked = {}) {
+std::string expect_step(const FilePath& path, int step, std::optional<int> asked = {}) {
   Matrix3d stress;
   stress << 11, 12, 13, 12, 22, 23, 13, 23, 33;
   const Matrix3d gradient = Eigen::Vector3d(1, 2, 3).asDiagonal();
@@ -126,7 +126,7 @@ constexpr std::array modes{EX_LARGE_MODEL, EX_NETCDF4};
 
 TEST(Exodus, TheLastCompleteStepIsTaken) {
   const TemporaryFolder folder;
-  const Path path = folder / "a.e";
+  const FilePath path = folder / "a.e";
   struct Row {
     const char* name;
     int last;  ///< Complete step of four.
@@ -171,7 +171,7 @@ TEST(Exodus, FillValuesAreHoles) {
 
 TEST(Exodus, VariablesThatAreNotThereAreLeftOut) {
   const TemporaryFolder folder;
-  const Path path = folder / "a.e";
+  const FilePath path = folder / "a.e";
   const auto left_out = [](const char* name) { return AllOf(HasSubstr("no array"), HasSubstr(name)); };
   write_bar(path, 2);
   set_aside(path, "vals_nod_var2");
@@ -211,11 +211,11 @@ TEST(Exodus, VariablesThatAreNotThereAreLeftOut) {
 
 TEST(Exodus, PiecesOfNemesisAreOneMesh) {
   const TemporaryFolder folder;
-  const Path first = folder / "out.e.2.0", second = folder / "out.e.2.1";
+  const FilePath first = folder / "out.e.2.0", second = folder / "out.e.2.1";
   for (const int mode : modes) {
     write_bar(first, 3, mode, 0, 2);
     write_bar(second, 3, mode, 2, 3);
-    for (const std::vector<Path>& files : {std::vector{first}, {second}, {first, second}, {second, first}}) {
+    for (const std::vector<FilePath>& files : {std::vector{first}, {second}, {first, second}, {second, first}}) {
       const Imported all = import(files, "v_", Take::gradient);
       EXPECT_EQ(all.report.mesh_cells, 5u);
       EXPECT_EQ(all.voxels(), 11u * 3 * 3);

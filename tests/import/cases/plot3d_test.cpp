@@ -82,7 +82,8 @@ std::string q_bytes(const Form& form, const std::vector<int>& sizes = {nx, ny, n
   return writer.bytes();
 }
 
-vtkSmartPointer<vtkDataSet> read(const std::filesystem::path& folder, const std::string& grid, const std::string& q) {
+vtkSmartPointer<vtkDataSet> read_parts(const std::filesystem::path& folder, const std::string& grid,
+                                       const std::string& q) {
   write_bytes(folder / "grid.bin", grid);
   write_bytes(folder / "q.bin", q);
   return read_plot3d(folder / "grid.bin", folder / "q.bin");
@@ -109,7 +110,7 @@ TEST(Plot3dTest, EveryForm) {
   for (int bits = 0; bits < 32; ++bits) {
     const Form form = form_of(bits);
     SCOPED_TRACE(bits);
-    const auto mesh = read(folder, grid_bytes(form), q_bytes(form));
+    const auto mesh = read_parts(folder, grid_bytes(form), q_bytes(form));
     expect_content(*mesh, form);
     EXPECT_EQ(mesh->GetPointData()->GetArray("velocity")->GetDataType(), form.doubles ? VTK_DOUBLE : VTK_FLOAT);
   }
@@ -119,7 +120,7 @@ TEST(Plot3dTest, PointsOfZeroDensityHaveNoVelocity) {
   const TemporaryFolder folder;
   std::string q = q_bytes({});
   std::fill_n(q.begin() + 28, 4, '\0');  // the first density, which follows three sizes and four numbers
-  const auto mesh = read(folder, grid_bytes({}), q);
+  const auto mesh = read_parts(folder, grid_bytes({}), q);
   EXPECT_TRUE(std::isnan(mesh->GetPointData()->GetArray("velocity")->GetComponent(0, 0)));
   EXPECT_FALSE(std::isnan(mesh->GetPointData()->GetArray("velocity")->GetComponent(1, 0)));
 }
@@ -128,7 +129,7 @@ TEST(Plot3dTest, PointsOfZeroDensityHaveNoVelocity) {
 TEST(Plot3dTest, FilesThatAreCutOffOrDoNotFitAreErrors) {
   const TemporaryFolder folder;
   const auto refuses = [&](const std::string& grid, const std::string& q, const std::string& name) {
-    const std::string error = error_in_child(folder / name, [&] { read(folder, grid, q); });
+    const std::string error = error_in_child(folder / name, [&] { read_parts(folder, grid, q); });
     EXPECT_THAT(error, HasSubstr(name + ": "));
   };
   for (int bits = 0; bits < 32; bits += 3) {
@@ -174,7 +175,7 @@ TEST(Plot3dTest, SeveralBlocksAreNamed) {
     for (int i = 0; i < 3 * count; ++i) blocks.real(i);
     blocks.end_record();
   }
-  const std::string error = error_of([&] { read(folder, blocks.bytes(), q_bytes(form)); });
+  const std::string error = error_of([&] { read_parts(folder, blocks.bytes(), q_bytes(form)); });
   EXPECT_NE(error.find("2 blocks"), std::string::npos) << error;
 }
 

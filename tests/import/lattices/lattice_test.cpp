@@ -24,7 +24,7 @@ using Components = std::function<std::vector<double>(const Vector3i&)>;
 using namespace mesh_fixtures;
 
 /// A lattice of `components(index)`. Expects that slices are read from the last to the first, once each.
-Lattice lattice_of(const Vector3i& size, const Components& components) {
+Lattice made_lattice(const Vector3i& size, const Components& components) {
   Lattice lattice;
   lattice.size = size;
   lattice.components = static_cast<int>(components(Vector3i::Zero()).size());
@@ -62,7 +62,7 @@ void expect_tensors_of(const TensorGrid& grid, const std::function<bool(const Ve
 }
 
 TEST(Lattice, EveryVoxelKeepsItsTensorAndPlace) {
-  Lattice lattice = lattice_of({11, 17, 9}, [](const Vector3i& index) { return full(tensor_at(index)); });
+  Lattice lattice = made_lattice({11, 17, 9}, [](const Vector3i& index) { return full(tensor_at(index)); });
   lattice.to_world.translate(Vector3d(3, 4, 5)).scale(0.5);
   LatticeReport report;
   const TensorGrid grid = tensors_of(lattice, {}, report);
@@ -73,7 +73,7 @@ TEST(Lattice, EveryVoxelKeepsItsTensorAndPlace) {
   EXPECT_EQ(grid.blocks.size(), 2u * 3 * 2);
   expect_tensors_of(grid, [](const Vector3i&) { return true; });
   const auto some = [](const Vector3i& block) { return (block.x() * 7 + block.y() * 3 + block.z()) % 4 == 1; };
-  lattice = lattice_of(
+  lattice = made_lattice(
       {40, 33, 29}, [&](const Vector3i& index) { return full(some(index / 8) ? tensor_at(index) : Matrix3d::Zero()); });
   lattice.zero_is_background = true;
   const TensorGrid part = tensors_of(lattice, {}, report);
@@ -83,7 +83,7 @@ TEST(Lattice, EveryVoxelKeepsItsTensorAndPlace) {
 }
 
 TEST(Lattice, SymmetricTensorsStaySymmetricWhenTurned) {
-  Lattice lattice = lattice_of({16, 8, 8}, [](const Vector3i& i) -> std::vector<double> {
+  Lattice lattice = made_lattice({16, 8, 8}, [](const Vector3i& i) -> std::vector<double> {
     return {std::sin(i.x() + 0.1), std::sin(i.y() + 0.2), 0.3 * i.z(), std::cos(i.x() * 1.0), 1.0 * i.y(), 0.7};
   });
   lattice.frame = test::rotation();
@@ -104,7 +104,7 @@ TEST(Lattice, MaskedZeroAndNonFiniteVoxelsAreInactive) {
       {nan, 1, 2, 3, 4, 5, 6},     // 7: masked, because the mask is NaN
       {1, 1e300, 0, 0, 0, 0, 0},   // 8: beyond single precision
   };
-  Lattice lattice = lattice_of({9, 1, 1}, [&](const Vector3i& index) { return voxels[index.x()]; });
+  Lattice lattice = made_lattice({9, 1, 1}, [&](const Vector3i& index) { return voxels[index.x()]; });
   lattice.masked = lattice.zero_is_background = true;
   LatticeReport report;
   const TensorGrid grid = tensors_of(lattice, TensorOrder::fsl, report);
@@ -118,7 +118,7 @@ TEST(Lattice, MaskedZeroAndNonFiniteVoxelsAreInactive) {
 }
 
 TEST(Lattice, OfMoreThanNineComponentsTheFirstSixAreTheTensor) {
-  const Lattice lattice = lattice_of(
+  const Lattice lattice = made_lattice(
       {1, 1, 1}, [](const Vector3i&) { return std::vector<double>{11, 22, 33, 12, 23, 13, 99, NAN, 99, 99}; });
   const TensorGrid grid = test::tensors_of(lattice, TensorOrder::vtk);
   test::expect_near(test::symmetric({11, 12, 13, 22, 23, 33}), test::voxel(grid, {0, 0, 0}));
@@ -126,7 +126,7 @@ TEST(Lattice, OfMoreThanNineComponentsTheFirstSixAreTheTensor) {
 
 TEST(Lattice, WrongNumbersOfComponentsAndAMissingOrderAreErrors) {
   const auto components = [](std::size_t count) {
-    Lattice lattice = lattice_of({1, 1, 1}, [=](const Vector3i&) { return std::vector<double>(count, 1); });
+    Lattice lattice = made_lattice({1, 1, 1}, [=](const Vector3i&) { return std::vector<double>(count, 1); });
     lattice.array = "stress";
     return lattice;
   };
@@ -149,7 +149,7 @@ TEST(Lattice, GradientOfALinearVectorFieldIsItsMatrixInWorldAxes) {
   to_world.linear() = test::rotation() * Vector3d(0.5, 2, 0.25).asDiagonal();
   to_world.translation() = Vector3d(3, 4, 5);
   const Matrix3d gradient = test::general_tensor(), frame = test::rotation().transpose();
-  Lattice lattice = lattice_of({13, 10, 9}, [&](const Vector3i& index) -> std::vector<double> {
+  Lattice lattice = made_lattice({13, 10, 9}, [&](const Vector3i& index) -> std::vector<double> {
     const Vector3d v = frame.transpose() * (gradient * (to_world * index.cast<double>()));
     return {v.x(), v.y(), v.z()};
   });
@@ -166,7 +166,7 @@ TEST(Lattice, GradientOfALinearVectorFieldIsItsMatrixInWorldAxes) {
 }
 
 TEST(Lattice, GradientLeavesOutInactiveVoxels) {
-  const Lattice lattice = lattice_of({9, 9, 9}, [](const Vector3i& index) -> std::vector<double> {
+  const Lattice lattice = made_lattice({9, 9, 9}, [](const Vector3i& index) -> std::vector<double> {
     if (index == Vector3i(4, 4, 4)) return {NAN, 0, 0};
     return {2.0 * index.x(), 0, 0};
   });

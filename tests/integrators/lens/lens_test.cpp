@@ -13,7 +13,7 @@ namespace {
 const LensMode modes[] = {LensMode::gather, LensMode::scatter};
 
 /// Across z, its normal +z: light goes along it.
-Plate plate_at(double z, const Vector2d& size, const Vector2i& resolution = {1, 1}) {
+Plate lens_plate(double z, const Vector2d& size, const Vector2i& resolution = {1, 1}) {
   Plate plate;
   plate.center = {0, 0, z};
   plate.size = size;
@@ -64,7 +64,7 @@ struct Bench {
         receiver(receiver_),
         texture(std::move(picture), wrap) {
     image.texture = &texture;
-    image.plane = plate_at(-1.5, image_size);
+    image.plane = lens_plate(-1.5, image_size);
     image.wraps = wrap == Wrap::repeat || wrap == Wrap::mirror;
   }
 
@@ -109,7 +109,7 @@ constexpr double rounding = 5e-7;
 
 TEST(Lens, ASmallerImageLeavesPixelsThatSeeNothing) {
   const Image picture = noise(24, 16);
-  const Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {0.75, 0.5}, picture);
+  const Bench bench(no_field(), lens_plate(1.5, {1.5, 1}, {48, 32}), {0.75, 0.5}, picture);
   for (const LensMode mode : modes) {
     const LensPicture seen = bench.simulate(mode);
     for (int y = 0; y < 32; ++y)
@@ -128,7 +128,7 @@ TEST(Lens, ASmallerImageLeavesPixelsThatSeeNothing) {
 }
 
 TEST(Lens, AnObstacleHidesTheImage) {
-  Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, uniform(0.5f), Wrap::clamp);
+  Bench bench(no_field(), lens_plate(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, uniform(0.5f), Wrap::clamp);
   const double pixel = 1.5 / 48;  // Its edges lie between pixels.
   bench.surfaces.obstacles.push_back(box_between({-8 * pixel, -4 * pixel, 1.1}, {12 * pixel, 6 * pixel, 1.2}));
   for (const LensMode mode : modes) {
@@ -146,7 +146,8 @@ TEST(Lens, AnObstacleHidesTheImage) {
 }
 
 TEST(Lens, SamplesOfAUniformImageHaveItsRadiance) {
-  Bench bench(cube_field(9, linear_tensor), plate_at(1.5, {0.6, 0.4}, {24, 16}), {3, 3}, uniform(0.75f), Wrap::repeat);
+  Bench bench(cube_field(9, linear_tensor), lens_plate(1.5, {0.6, 0.4}, {24, 16}), {3, 3}, uniform(0.75f),
+              Wrap::repeat);
   for (const LensMode mode : modes)
     for (const int samples : {1, 2, 3}) {
       bench.settings.samples = samples;
@@ -189,7 +190,7 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
                            T(0, 2) = 1;  // Moves all light along x, by about s.
                            return T;
                          }),
-              plate_at(1.5, {1, 1}, {64, 16}), {4, 4}, edge);
+              lens_plate(1.5, {1, 1}, {64, 16}), {4, 4}, edge);
   bench.settings.samples = 2;
   for (const LensMode mode : modes) {
     constexpr int many = 128;
@@ -221,7 +222,7 @@ TEST(Lens, AtATearPixelsHaveTheirPartOfEachBand) {
     const double angle = std::asin(2 * s);
     return (1 - std::cos(angle)) / s + 0.5 * std::tan(angle);
   };
-  Bench bench(constant_field(T), plate_at(1.5, {3, 3}, {96, 96}), {3, 3}, uniform(1), Wrap::clamp);
+  Bench bench(constant_field(T), lens_plate(1.5, {3, 3}, {96, 96}), {3, 3}, uniform(1), Wrap::clamp);
   constexpr int count = 3;
   const LensPicture seen = picture_of(bench, LensMode::scatter, {least, most}, true, count);
   int partly = 0;
@@ -253,8 +254,8 @@ TEST(Lens, PixelsAreTheMeanOfTheirPartsWhereTheMapBends) {
     return T;
   };
   constexpr int n = 4, size = 16;
-  Bench coarse(cube_field(17, tensor), plate_at(1.5, {1, 1}, {size, size}), {4, 4}, stripes);
-  Bench fine(cube_field(17, tensor), plate_at(1.5, {1, 1}, {n * size, n * size}), {4, 4}, stripes);
+  Bench coarse(cube_field(17, tensor), lens_plate(1.5, {1, 1}, {size, size}), {4, 4}, stripes);
+  Bench fine(cube_field(17, tensor), lens_plate(1.5, {1, 1}, {n * size, n * size}), {4, 4}, stripes);
   coarse.settings.samples = n;
   coarse.bending = fine.bending = settings_of(BendingMethod::splitting, 0.5);
   // (Not of scatter, whose gaps at tears are a quarter of a pixel wide: they differ with the pixels.)
@@ -285,7 +286,7 @@ TEST(Lens, PixelsHaveTheDisplayValueOfTheirRays) {
     return T;
   };
   const Vector2i size(96, 96);
-  Bench bench(cube_field(33, smooth), plate_at(1.5, {1, 1}, size), {3, 3}, waves);
+  Bench bench(cube_field(33, smooth), lens_plate(1.5, {1, 1}, size), {3, 3}, waves);
   constexpr double s = 0.2;
   const auto display = [](double radiance) { return std::pow(radiance, 1 / 2.4); };
   for (const LensMode mode : modes) {
@@ -316,7 +317,7 @@ TEST(Lens, PixelsHaveTheDisplayValueOfTheirRays) {
 }
 
 TEST(Lens, CanBeCancelled) {
-  const Bench bench(no_field(), plate_at(1.5, {1, 1}, {32, 32}), {1, 1}, uniform(1));
+  const Bench bench(no_field(), lens_plate(1.5, {1, 1}, {32, 32}), {1, 1}, uniform(1));
   for (const LensMode mode : modes) {
     Progress before;
     before.cancelled = true;
@@ -329,7 +330,7 @@ TEST(Lens, CanBeCancelled) {
 
 TEST(Lens, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
   constexpr int width = 3, height = 3000;  // 81 million squares of a pixel's shorter side.
-  const Bench bench(no_field(), plate_at(1.5, {1, 1}, {width, height}), {1, 1}, uniform(1));
+  const Bench bench(no_field(), lens_plate(1.5, {1, 1}, {width, height}), {1, 1}, uniform(1));
   // One thread does all tasks; of several, the caller's report, whose number differs from run to run.
   const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
   for (const LensMode mode : modes) {
@@ -354,7 +355,7 @@ TEST(Lens, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
 
 TEST(Lens, SettingsOutOfRangeAreRefused) {
   const auto refused = [](const std::function<void(Bench&)>& change) {
-    Bench bench(no_field(), plate_at(1.5, {1, 1}, {4, 4}), {1, 1}, uniform(1));
+    Bench bench(no_field(), lens_plate(1.5, {1, 1}, {4, 4}), {1, 1}, uniform(1));
     change(bench);
     for (const LensMode mode : modes) EXPECT_THROW(bench.simulate(mode), std::invalid_argument);
   };
@@ -372,7 +373,7 @@ TEST(Lens, PointsDescribeTheMapFromPixelsToTheImage) {
   const Vector2i size(64, 48);
   // Zero in the middle, so that light stays off the volume's sides, where the map has kinks.
   const auto tensor = [](const Vector3d& p) -> Matrix3d { return linear_tensor(p) - general_tensor(); };
-  Bench bench(cube_field(9, tensor), plate_at(1.5, {0.8, 0.6}, size), {4, 5}, noise(16, 16));
+  Bench bench(cube_field(9, tensor), lens_plate(1.5, {0.8, 0.6}, size), {4, 5}, noise(16, 16));
   for (const LensMode mode : modes) {
     const LensPicture seen = bench.simulate(mode, mode == LensMode::gather ? 0.3 : -0.3);  // About the same picture.
     double least = 1e9, greatest = -1e9;
@@ -448,7 +449,7 @@ struct Scan {
 
 TEST(Lens, ThreeSheetsBeyondTheFocus) {
   const double s = 0.4, k = 2.5, pixel = 0.04;
-  Bench bench(converging_field(k), plate_at(1.5, {2.4, 0.4}, {60, 10}), {2.8, 0.8}, noise(64, 16));
+  Bench bench(converging_field(k), lens_plate(1.5, {2.4, 0.4}, {60, 10}), {2.8, 0.8}, noise(64, 16));
   const Scan scan(bench, s);
   const double magnified = std::cos(2.0) - 0.5 * std::sin(2.0);  // On the axis, x'' = −s k x.
   for (const LensMode mode : modes) {

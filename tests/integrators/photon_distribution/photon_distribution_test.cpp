@@ -152,7 +152,7 @@ const LightBench& bench() {
 }
 
 /// Light that has four chunks.
-PhotonSettings settings_of(DensityKind kind) {
+PhotonSettings photon_settings(DensityKind kind) {
   PhotonSettings settings;
   settings.bending.step = 2;
   settings.photons = 200000;
@@ -199,7 +199,7 @@ Results interrupted(PhotonSettings settings) {
 }
 
 TEST(KeptPhotons, WantTheOutputsOfTheirBeginning) {
-  const PhotonSettings all = settings_of(DensityKind::histogram);
+  const PhotonSettings all = photon_settings(DensityKind::histogram);
   PhotonSettings fewer = all, unbanded = all;
   fewer.keep_photons = false;
   fewer.fluence = FluenceKind::none;
@@ -221,7 +221,7 @@ TEST(KeptPhotons, WantTheOutputsOfTheirBeginning) {
 
 /// Random positions fill the whole beam at once: the picture so far is as bright as the whole. Rows do not.
 TEST(KeptPhotons, PicturesSoFarAreAsBrightAsTheirLight) {
-  PhotonSettings settings = settings_of(DensityKind::gaussian);
+  PhotonSettings settings = photon_settings(DensityKind::gaussian);
   for (const BeamPattern pattern : {BeamPattern::random, BeamPattern::stratified}) {
     settings.pattern = pattern;
     Job job;
@@ -244,7 +244,7 @@ TEST(KeptPhotons, OfOtherWorkAreRefused) {
   StrangeRanks ranks;
   Job job;
   job.ranks = &ranks;
-  EXPECT_THROW(distribute(settings_of(DensityKind::histogram), &job), DamagedArchive);
+  EXPECT_THROW(distribute(photon_settings(DensityKind::histogram), &job), DamagedArchive);
 }
 
 }  // namespace

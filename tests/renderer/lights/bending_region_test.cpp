@@ -7,7 +7,7 @@
 namespace tensorray {
 namespace {
 
-constexpr int bands = 4;
+constexpr int region_bands = 4;
 
 /// The ball of radius ½ about the origin. All light that passes through it turns about z by one angle for each band, at
 /// its centre, which keeps radiance; the ray goes on from the ball's centre.
@@ -53,11 +53,11 @@ const TestBands& four_bands() {
   return result;
 }
 
-std::vector<float> even(float value) { return four_bands().even(value); }
+std::vector<float> even_reflectance(float value) { return four_bands().even(value); }
 
 /// A floor below the ball, lit by `lights`, of which the first may be the area light of a lamp.
-struct Stage : World {
-  explicit Stage(const std::vector<Light>& all_lights, double albedo = 0.6)
+struct RegionStage : World {
+  explicit RegionStage(const std::vector<Light>& all_lights, double albedo = 0.6)
       : World(four_bands(), parts(all_lights),
               {make_material(Diffuse{}, four_bands().grey(albedo)), make_material(Diffuse{}, four_bands().grey(0))},
               all_lights) {}
@@ -69,10 +69,12 @@ struct Stage : World {
   }
 };
 
-AreaLight lamp() { return {rectangle_mesh({0.3, 0, 1.2}, {1, 0, 0}, {0, -1, 0}, {0.8, 0.8}), even(5)}; }
+AreaLight region_lamp() {
+  return {rectangle_mesh({0.3, 0, 1.2}, {1, 0, 0}, {0, -1, 0}, {0.8, 0.8}), even_reflectance(5)};
+}
 
 TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
-  Stage stage({ConstantLight{even(1)}}, 1);
+  RegionStage stage({ConstantLight{even_reflectance(1)}}, 1);
   const TurningBall ball(0.3);
   stage.scene.region = &ball;
   stage.scene.bands_per_view = 4;
@@ -84,7 +86,7 @@ TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
 }
 
 TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
-  Stage stage({lamp(), ConstantLight{even(0.2f)}});
+  RegionStage stage({region_lamp(), ConstantLight{even_reflectance(0.2f)}});
   const TurningBall ball(0.4, 1.5);
   stage.scene.region = &ball;
   std::vector<Mean> means;
@@ -97,7 +99,7 @@ TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
 }
 
 TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
-  Stage stage({lamp(), ConstantLight{even(0.2f)}});
+  RegionStage stage({region_lamp(), ConstantLight{even_reflectance(0.2f)}});
   const TurningBall ball(0.4, 1.5);
   stage.scene.region = &ball;
   stage.scene.bands_per_view = 2;
@@ -132,11 +134,11 @@ TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
 
 /// Rays that do not arrive count as 0 in the sums, and not in the means.
 TEST(BendingRegionTest, MeansAreOfTheRaysThatArrive) {
-  Stage stage({ConstantLight{even(1)}});
+  RegionStage stage({ConstantLight{even_reflectance(1)}});
   TurningBall ball(0.01, 1.5);
   ball.lost_band = 3;
   stage.scene.region = &ball;
-  stage.scene.bands_per_view = bands;
+  stage.scene.bands_per_view = region_bands;
   RayShader shader(stage.scene, {});
   shader.shade({{{0, -3, 0}, {0, 1, 0}, {3, 0, 0, 0}}}, true);
   const BentView view = shader.view(0).bent.value();
@@ -148,8 +150,8 @@ TEST(BendingRegionTest, MeansAreOfTheRaysThatArrive) {
 /// A directional light reaches no surface through the region, because landed light has it; the camera still sees it.
 TEST(BendingRegionTest, AnIrradianceMapReplacesTheSunBehindTheRegion) {
   DirectionalLight sun;
-  sun.irradiance = even(2);
-  Stage stage({sun});
+  sun.irradiance = even_reflectance(2);
+  RegionStage stage({sun});
   const TurningBall ball(0.1);
   stage.scene.region = &ball;
   const auto radiance = [&](const Vector3d& to) { return seen(stage.scene, {}, {0, -3, 1}, to, 100).mean(); };
@@ -160,8 +162,8 @@ TEST(BendingRegionTest, AnIrradianceMapReplacesTheSunBehindTheRegion) {
   IrradianceMap landed;
   landed.plate.center = {0, 0, -0.8};
   landed.plate.resolution = {4, 4};
-  landed.bands = bands;
-  landed.irradiance.assign(16 * bands, 3);
+  landed.bands = region_bands;
+  landed.irradiance.assign(16 * region_bands, 3);
   stage.scene.irradiance_maps = {landed};
   EXPECT_NEAR(radiance(below), 3 * 0.6 / pi, 1e-6);
   stage.scene.irradiance_maps[0].side = -1;
@@ -173,7 +175,7 @@ TEST(BendingRegionTest, BentLightIsLimitedInAllBandsAlike) {
   TriangleMesh room = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, Eigen::Affine3d::Identity());
   for (auto& triangle : room.triangles) std::swap(triangle[1], triangle[2]);  // They face inwards.
   World world(four_bands(), {surface_of(room, 0, 0)}, {make_material(Diffuse{}, four_bands().grey(0.5))},
-              {AreaLight{room, even(8)}});
+              {AreaLight{room, even_reflectance(8)}});
   const TurningBall ball(0.7);
   world.scene.region = &ball;
   ShadingSettings settings;

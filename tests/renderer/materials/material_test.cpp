@@ -24,7 +24,7 @@ Eigen::Vector3d random_point(std::uint64_t seed, int index) {
   return {random_uniform(seed, index, 0), random_uniform(seed, index, 1), random_uniform(seed, index, 2)};
 }
 
-RoughConductor mirror(double roughness) { return {roughness, {BandValues::Zero(1), BandValues::Ones(1)}}; }
+RoughConductor metal_mirror(double roughness) { return {roughness, {BandValues::Zero(1), BandValues::Ones(1)}}; }
 
 struct Named {
   std::string name;
@@ -37,7 +37,7 @@ std::vector<Named> materials(double roughness, double reflectance) {
   const Principled coated_plastic{0, roughness, 1, 1, 0.03}, half{0.5, roughness, 0.5, 0.7, 0.6};
   const Principled coated_metal{1, roughness, 0.5, 1, 0.3};
   return {{"diffuse", make_material(Diffuse{}, color)},
-          {"metal", make_material(mirror(roughness), color)},
+          {"metal", make_material(metal_mirror(roughness), color)},
           {"glass", make_material(RoughDielectric{roughness, 1.5}, color)},
           {"bubble", make_material(RoughDielectric{roughness, 0.8}, color)},
           {"plastic", make_material(Principled{0, roughness, 0.5, 0, 0.1}, color)},

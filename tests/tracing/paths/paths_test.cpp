@@ -250,14 +250,14 @@ class PathThinning : public EveryInstructionSet {};
 INSTANTIATE_TEST_SUITE_P(All, PathThinning, instruction_sets(), instruction_set_name);
 
 /// A ray that was traced from a seed within the field, in both directions.
-struct Traced {
+struct TracedBothWays {
   TensorField field;
   std::vector<RayRecord> back, on;
   JoinedRay ray;
 };
 
-Traced trace_both(const TensorField& field, const Vector3d& index, double flexibility) {
-  Traced traced{field, {}, {}, {}};
+TracedBothWays trace_both(const TensorField& field, const Vector3d& index, double flexibility) {
+  TracedBothWays traced{field, {}, {}, {}};
   const Geometry geometry(surfaces_of(field));
   for (const double sign : {1.0, -1.0}) {
     RayBatch batch;
@@ -269,13 +269,13 @@ Traced trace_both(const TensorField& field, const Vector3d& index, double flexib
   return traced;
 }
 
-Traced bent_ray(double flexibility = 0.2) {
+TracedBothWays bent_ray(double flexibility = 0.2) {
   const TensorFunction smooth = smooth_tensor(3);
   const auto strong = [&](const Vector3d& p) { return Matrix3d(smooth(p) + 0.2 * Matrix3d::Identity()); };
   return trace_both(lattice_field(odd_box(), lattices()[2], strong), {3, 20, 5}, flexibility);
 }
 
-PathPoints all_points(const Traced& traced) {
+PathPoints all_points(const TracedBothWays& traced) {
   PathPoints points;
   for (const JoinedPoint& joined : traced.ray.points) {
     points.push_back(joined.point);
@@ -288,7 +288,7 @@ PathPoints all_points(const Traced& traced) {
 /// The error of each point between two that stay, in the tolerances' units, in double precision.
 TEST_P(PathThinning, KeepsItsTolerances) {
   for (const double flexibility : {0.05, 0.2, 0.8}) {
-    const Traced traced = bent_ray(flexibility);
+    const TracedBothWays traced = bent_ray(flexibility);
     const PathPoints points = all_points(traced);
     PathSamples samples;
     sample_path(traced.field, traced.ray, true, samples);

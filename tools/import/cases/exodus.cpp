@@ -69,7 +69,7 @@ std::vector<std::string> variables_of(int file, ex_entity_type kind) {
 /// Calls `visit(kind, name, variables)` for each array of the reader, which joins variables that follow each other:
 /// stress_xx, stress_xy, stress_xz become a vector stress_x.
 template <class Visit>
-void for_each_array(const Piece& piece, const Visit& visit) {
+void for_each_exodus_array(const Piece& piece, const Visit& visit) {
   for (const auto& [kind, names] : piece.variables) {
     auto next = names.begin();
     for (int i = 0; i < piece.reader->GetNumberOfObjectArrays(kind); ++i) {
@@ -139,7 +139,7 @@ std::string unwritten(const Piece& piece, int step) {
 
 /// Requests all variables that are there, in all blocks.
 void enable(const Piece& piece) {
-  for_each_array(piece, [&](Kind kind, const char* array, const std::vector<std::string>& variables) {
+  for_each_exodus_array(piece, [&](Kind kind, const char* array, const std::vector<std::string>& variables) {
     const bool is_whole = std::none_of(variables.begin(), variables.end(),
                                        [&](const std::string& one) { return piece.missing.count(one) > 0; });
     piece.reader->SetObjectArrayStatus(kind, array, is_whole ? 1 : 0);
@@ -180,7 +180,7 @@ Piece open_piece(const Path& path) {
 
 /// Names the components of joined variables as these are called in the file.
 void name_components(const Piece& piece, vtkDataSet& data) {
-  for_each_array(piece, [&](Kind kind, const char* name, const std::vector<std::string>& variables) {
+  for_each_exodus_array(piece, [&](Kind kind, const char* name, const std::vector<std::string>& variables) {
     const auto type = kind == Kind::NODAL ? vtkDataObject::POINT : vtkDataObject::CELL;
     vtkDataArray* const array = data.GetAttributes(type)->GetArray(name);
     const auto count = static_cast<vtkIdType>(variables.size());

@@ -20,7 +20,7 @@ namespace {
 
 using Path = std::filesystem::path;
 
-void require_file(const Path& path) {
+void require_plot3d_file(const Path& path) {
   if (!std::filesystem::exists(path)) fail(path, "does not exist; PLOT3D needs two files, the grid and its q file");
   require_no_device(path);
   if (!std::filesystem::is_regular_file(path)) fail(path, "is not a file");
@@ -66,7 +66,7 @@ void add_velocity(vtkPointData& data) {
 }  // namespace
 
 vtkSmartPointer<vtkDataSet> read_plot3d(const Path& grid_path, const Path& q_path) {
-  for (const Path& path : {grid_path, q_path}) require_file(path);
+  for (const Path& path : {grid_path, q_path}) require_plot3d_file(path);
   const VtkMessages messages;
   vtkNew<vtkMultiBlockPLOT3DReader> reader;
   reader->AutoDetectFormatOn();

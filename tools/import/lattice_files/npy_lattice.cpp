@@ -24,7 +24,7 @@
 namespace tensorray {
 namespace {
 
-struct Header {
+struct NpyHeader {
   std::string type;  ///< As number_type takes it.
   int number_bytes = 0;
   ByteOrder order = host_byte_order();
@@ -33,7 +33,7 @@ struct Header {
   std::uint64_t data_start = 0;  ///< Offset in the file, in bytes.
 };
 
-std::string read_dictionary(std::ifstream& file, const std::filesystem::path& path, Header& header) {
+std::string read_dictionary(std::ifstream& file, const std::filesystem::path& path, NpyHeader& header) {
   std::array<unsigned char, 12> start{};
   file.read(reinterpret_cast<char*>(start.data()), 10);
   if (std::memcmp(start.data(), "\x93NUMPY", 6) != 0) fail(path, "is not a .npy file of NumPy");
@@ -79,8 +79,8 @@ std::vector<std::size_t> shape_of(const std::string& text, const std::filesystem
   return shape;
 }
 
-Header read_header(std::ifstream& file, const std::filesystem::path& path, bool is_mask) {
-  Header header;
+NpyHeader read_header(std::ifstream& file, const std::filesystem::path& path, bool is_mask) {
+  NpyHeader header;
   const std::string dictionary = read_dictionary(file, path, header);
   const std::string descr = value_of(dictionary, "descr", path);
   const auto one_of = [&](std::size_t i, const std::string& characters) {
@@ -98,7 +98,7 @@ Header read_header(std::ifstream& file, const std::filesystem::path& path, bool 
   return header;
 }
 
-std::size_t component_count(const Header& header, const std::filesystem::path& path, bool is_mask) {
+std::size_t component_count(const NpyHeader& header, const std::filesystem::path& path, bool is_mask) {
   const auto& shape = header.shape;
   if (is_mask && shape.size() == 3) return 1;
   if (is_mask) fail(path, fmt::format("its shape is ({}): a mask is (nz, ny, nx)", fmt::join(shape, ", ")));
@@ -109,7 +109,7 @@ std::size_t component_count(const Header& header, const std::filesystem::path& p
                          fmt::join(shape, ", ")));
 }
 
-void check_size(const Header& header, const std::filesystem::path& path) {
+void check_size(const NpyHeader& header, const std::filesystem::path& path) {
   double needed = header.number_bytes;
   for (const std::size_t extent : header.shape) needed *= static_cast<double>(extent);
   const auto held = static_cast<double>(std::filesystem::file_size(path)) - static_cast<double>(header.data_start);
@@ -125,7 +125,7 @@ Lattice open_npy(const std::filesystem::path& path, bool is_mask) {
   require_file(path);
   std::ifstream file(path, std::ios::binary);
   if (!file) fail(path, "cannot be read");
-  const Header header = read_header(file, path, is_mask);
+  const NpyHeader header = read_header(file, path, is_mask);
   const std::size_t components = component_count(header, path, is_mask);
   check_size(header, path);
   Lattice lattice;
