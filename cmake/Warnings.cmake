@@ -16,7 +16,7 @@ else()
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     # False positives inside inlined Eigen and standard library code at -O3.
     target_compile_options(tensorray_options INTERFACE -Wno-maybe-uninitialized -Wno-null-dereference
-                           -Wno-array-bounds -Wno-stringop-overflow)
+                           -Wno-array-bounds -Wno-stringop-overflow -Wno-free-nonheap-object)
   endif()
   if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
     target_compile_options(tensorray_options INTERFACE -Wno-sign-conversion)  # Which -Wconversion of GCC leaves out.
