@@ -228,8 +228,8 @@ TEST_F(VtkDamage, FilesThatAreCutOff) {
                 "")
           << ending << part;
   }
-  for (const auto& [ending, written] :
-       data_sets()) {                      // New ones: the XML writer leaves keys that a legacy file has last.
+  // New ones: the XML writer leaves keys in arrays, which a legacy file then has last.
+  for (const auto& [ending, written] : data_sets()) {
     written->GetCellData()->Initialize();  // The tensors become the last array of the file.
     for (const bool binary : {false, true}) {
       write_legacy(*written, folder_ / "whole.vtk", binary);
