@@ -147,10 +147,10 @@ TEST(Hdf5File, LinksToOtherFiles) {
 }
 
 // VTKHDF files, written dataset by dataset as the format prescribes.
-/// 0, 1, ... count − 1.
-Doubles counting(int count) {
+/// 0, 1, ... end − 1.
+Doubles counting(int end) {
   Doubles values;
-  for (int i = 0; i < count; ++i) values.push_back(i);
+  for (int i = 0; i < end; ++i) values.push_back(i);
   return values;
 }
 
