@@ -416,8 +416,8 @@ class FlowMapBuilder {
   }
 
   /// How far the landings of the middles are, at most, from what the corners beside them predict, at one wavelength
-  /// sample: of those that are known. Where some light does not land, and the edge of its shadow is not within the
-  /// quad, it is infinite, so that all of the quad is divided further; but not before the last division.
+  /// sample. Where some light does not land, and the edge of its shadow is not within the quad, it is infinite, so that
+  /// the quad's parts are divided again; but if only the last division is left, it is that of the known middles.
   float deviation_at(const Quad& quad, const Middles& middles, const ShadowEdge& edge, std::size_t sample) const {
     const bool is_last = settings_.silhouette && quad.level + 2 >= lattice().levels;
     std::array<Eigen::Vector2f, 4> at;
