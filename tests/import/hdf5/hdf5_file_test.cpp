@@ -4,14 +4,7 @@
 
 #include <functional>
 
-#include <vtkCellData.h>
-#include <vtkDataArray.h>
-#include <vtkDataSet.h>
-#include <vtkImageData.h>
-#include <vtkPointData.h>
-#include <vtkRectilinearGrid.h>
-#include <vtkSmartPointer.h>
-#include <vtkStructuredGrid.h>
+#include <fmt/format.h>
 
 #include "base/text/byte_order.h"
 #include "tests/import/hdf5_writer.h"
@@ -24,6 +17,7 @@ namespace {
 
 using Ints = std::vector<int>;
 using Doubles = std::vector<double>;
+using Strings = std::vector<std::string>;
 namespace fs = std::filesystem;
 
 constexpr hsize_t count = 6;
@@ -49,10 +43,15 @@ bool make(const std::filesystem::path& path, const std::string& name, const std:
   return data >= 0;
 }
 
+/// Sets chunks of so many numbers.
+std::function<void(hid_t)> chunks_of(hsize_t size) {
+  return [size](hid_t properties) { H5Pset_chunk(properties, 1, &size); };
+}
+
 TEST(Hdf5File, NumbersThatAreElsewhereOrNowhere) {
   const TemporaryFolder folder;
-  const std::filesystem::path path = folder / "a.h5";
-  const std::vector<double> numbers{1, 2, 3, 4, 5, 6};
+  const fs::path path = folder / "a.h5";
+  const Doubles numbers{1, 2, 3, 4, 5, 6};
   { Hdf5Writer(folder / "source.h5").write("/there", {count}, numbers); }
   { Hdf5Writer(folder / "source.h5.unwritten").announce("/there", {count}); }
   write_bytes(folder / "raw.bin", std::string(reinterpret_cast<const char*>(numbers.data()), 8 * count));
@@ -60,7 +59,7 @@ TEST(Hdf5File, NumbersThatAreElsewhereOrNowhere) {
   {
     Hdf5Writer file(path);
     file.write("/own", {count}, numbers);
-    file.write("/zeros", {count}, std::vector<double>(count, 0));
+    file.write("/zeros", {count}, Doubles(count, 0));
     file.announce("/announced", {count});
   }
   const auto virtual_of = [](const char* file, const char* source) {
@@ -72,10 +71,6 @@ TEST(Hdf5File, NumbersThatAreElsewhereOrNowhere) {
   };
   const auto external = [](const char* file) {
     return [file](hid_t properties) { H5Pset_external(properties, file, 0, 8 * count); };
-  };
-  const auto chunked = [](hid_t properties) {
-    const hsize_t three = 3;
-    H5Pset_chunk(properties, 1, &three);
   };
   struct Row {
     const char* name;
@@ -98,7 +93,7 @@ TEST(Hdf5File, NumbersThatAreElsewhereOrNowhere) {
       {"/e", external("raw.bin"), ""},
       {"/e_gone", external("gone.bin"), "its dataset /e_gone are in the file gone.bin, which is missing"},
       {"/e_cut", external("cut.bin"), "cut.bin, which is missing or cut off"},
-      {"/chunks", chunked, "/chunks was announced, and not written"}};
+      {"/chunks", chunks_of(3), "/chunks was announced, and not written"}};
   for (const Row& row : table) {
     EXPECT_TRUE(!row.set || make(path, row.name, row.set)) << row.name;
     const std::string error = error_of([&] {
@@ -115,24 +110,20 @@ TEST(Hdf5File, NumbersThatAreElsewhereOrNowhere) {
 TEST(Hdf5File, PartsThatWereNotWritten) {
   const TemporaryFolder folder;
   { Hdf5Writer file(folder / "a.h5"); }
-  const auto two = [](hid_t properties) {
-    const hsize_t chunk = 2;
-    H5Pset_chunk(properties, 1, &chunk);
-  };
-  ASSERT_TRUE(make(folder / "a.h5", "/x", two, {0, 0, 0}));
+  ASSERT_TRUE(make(folder / "a.h5", "/x", chunks_of(2), {0, 0, 0}));
   const Hdf5File file(folder / "a.h5");
   const auto error = [&](std::uint64_t start, std::uint64_t size) {
     return error_of([&] { file.read("/x", {{start}, {1}, {size}}); });
   };
   for (const std::uint64_t start : {0, 1, 2, 3}) EXPECT_EQ(error(start, 2), "") << start;
-  EXPECT_THAT(error(4, 2), HasSubstr("/x was announced, and not written"));
-  EXPECT_THAT(error(5, 1), HasSubstr("/x was announced, and not written"));
+  for (const std::uint64_t start : {4, 5})
+    EXPECT_THAT(error(start, 6 - start), HasSubstr("/x was announced, and not written")) << start;
   EXPECT_EQ(error(0, 6), "");
 }
 
 TEST(Hdf5File, LinksToOtherFiles) {
   const TemporaryFolder folder;
-  { Hdf5Writer(folder / "source.h5").write("/there/x", {1}, std::vector<double>{7}); }
+  { Hdf5Writer(folder / "source.h5").write("/there/x", {1}, Doubles{7}); }
   { Hdf5Writer file(folder / "a.h5"); }
   const hid_t id = H5Fopen((folder / "a.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
   H5Lcreate_external("source.h5", "/there", id, "/good", H5P_DEFAULT, H5P_DEFAULT);
@@ -196,18 +187,18 @@ TEST(VtkHdf, PartsAreMergedAndStepsAreRead) {
 }
 
 /// An image of 3 x 2 x 2 points.
-void begin_image(Hdf5Writer& file, const Doubles& version, const Doubles& origin, const Doubles& spacing) {
-  file.begin_vtk("ImageData", version);
+void begin_image(Hdf5Writer& file, double version) {
+  file.begin_vtk("ImageData", {version, 0});
   file.attribute("/VTKHDF", "WholeExtent", Doubles{0, 2, 0, 1, 0, 1});
-  file.attribute("/VTKHDF", "Origin", origin);
-  file.attribute("/VTKHDF", "Spacing", spacing);
+  file.attribute("/VTKHDF", "Origin", Doubles{1, 2, 3});
+  file.attribute("/VTKHDF", "Spacing", Doubles{0.5, 1, 2});
 }
 
 TEST(VtkHdf, Images) {
   const TemporaryFolder folder;
   {
     Hdf5Writer file(folder / "a.hdf");
-    begin_image(file, Doubles{1, 0}, Doubles{1, 2, 3}, Doubles{0.5, 1, 2});
+    begin_image(file, 1);
     file.write("/VTKHDF/PointData/v", {2, 2, 3, 3}, counting(12 * 3));
   }
   const auto image = read_vtk_source(folder / "a.hdf");
@@ -222,11 +213,11 @@ TEST(VtkHdf, ArraysOfImagesMayStay) {
   const TemporaryFolder folder;
   {
     Hdf5Writer file(folder / "a.vtkhdf");
-    begin_image(file, Doubles{2, 0}, Doubles{0, 0, 0}, Doubles{1, 1, 1});
+    begin_image(file, 2);
     file.group("/VTKHDF/Steps");
     file.attribute("/VTKHDF/Steps", "NSteps", Doubles{2});
-    file.write("/VTKHDF/PointData/moving", {2, 2, 2, 3, 3}, counting(2 * 12 * 3));
-    file.write("/VTKHDF/PointData/named", {2, 2, 2, 3, 3}, counting(2 * 12 * 3));
+    for (const std::string name : {"moving", "named"})
+      file.write("/VTKHDF/PointData/" + name, {2, 2, 2, 3, 3}, counting(2 * 12 * 3));
     file.write("/VTKHDF/Steps/PointDataOffsets/named", {2}, Ints{1, 0});
     file.write("/VTKHDF/PointData/still", {2, 2, 3, 3}, counting(12 * 3));
     file.text("/VTKHDF/PointData/label", "water");
@@ -253,7 +244,7 @@ TEST(VtkHdf, DamageAndOtherKindsAreErrorsWithTheFile) {
       {[&] { write_grid(path, false, 3); }, "a.vtkhdf: is of version 3"},
       {[&] {
          Hdf5Writer file(path);
-         begin_image(file, {2, 0}, {0, 0, 0}, {1, 1, 1});
+         begin_image(file, 2);
          file.announce("/VTKHDF/PointData/v", {1 << 30, 1 << 20});  // None of these numbers was written.
        },
        "a.vtkhdf: is damaged, or too large: it announces more than memory holds"},
@@ -297,12 +288,9 @@ std::string grid_document(const std::string& items) { return document("<Grid Nam
 
 /// A scalar at the five points, with the value `first` at the first one.
 std::string attribute(const std::string& name, int first) {
-  std::string numbers;
-  for (int i = 0; i < 5; ++i) numbers += std::to_string(first + i) + " ";
-  return "<Attribute Name=\"" + name +
-         "\" AttributeType=\"Scalar\" Center=\"Node\"><DataItem Dimensions=\"5 1\" "
-         "Format=\"XML\">" +
-         numbers + "</DataItem></Attribute>";
+  return fmt::format(R"(<Attribute Name="{}" AttributeType="Scalar" Center="Node">
+    <DataItem Dimensions="5 1" Format="XML">{} {} {} {} {}</DataItem></Attribute>)",
+                     name, first, first + 1, first + 2, first + 3, first + 4);
 }
 
 vtkSmartPointer<vtkDataSet> read(const fs::path& folder, const std::string& text, std::optional<int> step = {}) {
@@ -331,15 +319,14 @@ TEST(Xdmf, AGridInTheFileItself) {
 /// A mesh, and for each function a collection of grids in time that include the mesh: as FEniCSx writes it.
 TEST(Xdmf, FunctionsOfFenicsxShareTheirMesh) {
   const TemporaryFolder folder;
-  const std::string include =
-      "<ns0:include xpointer=\"xpointer(/Xdmf/Domain/Grid[@GridType='Uniform'][1]/*[self::Topology or "
-      "self::Geometry])\" />";
-  const auto function = [&](const std::string& name, int first) {
+  const auto function = [](const std::string& name, int first) {
     std::string grids;
     for (const int step : {0, 1})
-      grids += "<Grid Name=\"" + name + "\" GridType=\"Uniform\">" + include + "<Time Value=\"" + std::to_string(step) +
-               "\" />" + attribute(name, first + 100 * step) + "</Grid>";
-    return "<Grid Name=\"" + name + "\" GridType=\"Collection\" CollectionType=\"Temporal\">" + grids + "</Grid>";
+      grids += fmt::format(R"xml(<Grid Name="{}" GridType="Uniform"><ns0:include
+        xpointer="xpointer(/Xdmf/Domain/Grid[@GridType='Uniform'][1]/*[self::Topology or self::Geometry])" />
+        <Time Value="{}" />{}</Grid>)xml",
+                           name, step, attribute(name, first + 100 * step));
+    return fmt::format(R"(<Grid Name="{}" GridType="Collection" CollectionType="Temporal">{}</Grid>)", name, grids);
   };
   const std::string text = document("<Grid Name=\"mesh\" GridType=\"Uniform\">" + mesh_items + "</Grid>" +
                                     function("f", 1) + function("g", 50));
@@ -356,11 +343,9 @@ TEST(Xdmf, NumbersInHdf5WithReferencesSlabsAndEntities) {
   const TemporaryFolder folder;
   {
     Hdf5Writer file(folder / "b.h5");
-    file.write("/geometry/vertices", {5, 3}, std::vector<double>{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1});
-    file.write("/topology/cells", {2, 4}, std::vector<int>{0, 1, 2, 3, 1, 2, 3, 4});
-    std::vector<double> fields;
-    for (int i = 0; i < 2 * 5 * 3; ++i) fields.push_back(i);
-    file.write("/fields/u", {2, 5, 3}, fields);
+    file.write("/geometry/vertices", {5, 3}, Doubles{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1});
+    file.write("/topology/cells", {2, 4}, Ints{0, 1, 2, 3, 1, 2, 3, 4});
+    file.write("/fields/u", {2, 5, 3}, counting(2 * 5 * 3));
   }
   // PyLith: items that others refer to, an entity for the file's name, and parts of a dataset with all steps.
   const std::string text = document(R"xml(
@@ -446,6 +431,13 @@ TEST(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
   const auto with_array = [&](const std::string& item) {
     return error(grid_document(mesh_items + "<Attribute Name=\"f\">" + item + "</Attribute>"));
   };
+  const auto ordered = [&](const char* type, const char* size, const char* geometry, const Strings& lists) {
+    std::string items;
+    for (const std::string& list : lists) items += "<DataItem Format=\"XML\">" + list + "</DataItem>";
+    return error(grid_document(
+        fmt::format(R"(<Topology TopologyType="{}" Dimensions="{}"/><Geometry GeometryType="{}">{}</Geometry>)", type,
+                    size, geometry, items)));
+  };
   EXPECT_THAT(error(grid_document(mesh_items).substr(0, 200)), HasSubstr("a.xdmf: is damaged"));
   EXPECT_THAT(error(document("")), HasSubstr("has no grid"));
   EXPECT_THAT(changed("1 2 3 4</DataItem>", "1 2 3</DataItem>"), HasSubstr("has 7"));
@@ -458,6 +450,19 @@ TEST(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
               HasSubstr("refers to itself"));
   write_bytes(folder / "b.h5", "\x89HDF\r\n\x1a\n and no more");
   EXPECT_THAT(changed("Format=\"XML\">0 0", "Format=\"HDF\">b.h5:/x"), HasSubstr("b.h5: is no HDF5"));
+  // Numbers whose products are beyond all integers, or that do not fit each other.
+  EXPECT_THAT(with_array(R"(<DataItem ItemType="HyperSlab" Dimensions="5">
+      <DataItem Format="XML">0 17592186044416 1048577</DataItem><DataItem Format="XML">1 2 3 4 5</DataItem></DataItem>)"),
+              HasSubstr("a.xdmf: a DataItem is a HyperSlab beyond"));
+  EXPECT_THAT(ordered("3DCoRectMesh", "1000000000 1000000000 1000000000", "Origin_DxDyDz", {"0 0 0", "1 1 1"}),
+              HasSubstr("senseless"));
+  EXPECT_THAT(ordered("3DCoRectMesh", "2 2 2", "VxVyVz", {"5 6", "5 6", "5 6"}),
+              HasSubstr("type vxvyvz, which does not fit"));
+  EXPECT_THAT(ordered("3DRectMesh", "2 2 2", "Origin_DxDyDz", {"5 6 7", "1 1 1"}),
+              HasSubstr("type origin_dxdydz, which does not fit"));
+  EXPECT_THAT(ordered("3DRectMesh", "2 2 3", "VxVyVz", {"5 6", "5 6", "5 6"}),
+              HasSubstr("other numbers of coordinates"));
+  EXPECT_THAT(ordered("3DSMesh", "2 2 2", "XYZ", {"0 0 0  1 0 0"}), HasSubstr("another number of points"));
 }
 
 TEST(Xdmf, BlocksThatShareTheirPointsAreNotTheSameMesh) {
@@ -489,35 +494,6 @@ TEST(Xdmf, PointsMayBeCountedFromOne) {
   }
   const std::string ordered = with("Tetrahedron", "Order=\"3 2 1 0\"", "0 1 2 3  1 2 3 4");
   EXPECT_THAT(error_of([&] { read(folder, ordered); }), HasSubstr("order of points of their own"));
-}
-
-/// Numbers whose products are beyond all integers, or that do not fit each other.
-TEST(Xdmf, SizesThatDoNotFitAreErrors) {
-  const TemporaryFolder folder;
-  const auto items = [](const std::vector<std::string>& lists) {
-    std::string text;
-    for (const std::string& list : lists) text += "<DataItem Format=\"XML\">" + list + "</DataItem>";
-    return text;
-  };
-  const auto grid_of = [&](const std::string& type, const std::string& size, const std::string& geometry,
-                           const std::vector<std::string>& lists) {
-    return "<Topology TopologyType=\"" + type + "\" Dimensions=\"" + size + "\"/><Geometry GeometryType=\"" + geometry +
-           "\">" + items(lists) + "</Geometry>";
-  };
-  const std::string huge = "1000000000 1000000000 1000000000";
-  const std::pair<std::string, const char*> table[] = {
-      {mesh_items + "<Attribute Name=\"f\"><DataItem ItemType=\"HyperSlab\" Dimensions=\"5\">" +
-           items({"0 17592186044416 1048577", "1 2 3 4 5"}) + "</DataItem></Attribute>",
-       "a.xdmf: a DataItem is a HyperSlab beyond"},
-      {grid_of("3DCoRectMesh", huge, "Origin_DxDyDz", {"0 0 0", "1 1 1"}), "senseless"},
-      {grid_of("3DCoRectMesh", "2 2 2", "VxVyVz", {"5 6", "5 6", "5 6"}), "type vxvyvz, which does not fit"},
-      {grid_of("3DRectMesh", "2 2 2", "Origin_DxDyDz", {"5 6 7", "1 1 1"}), "type origin_dxdydz, which does not fit"},
-      {grid_of("3DRectMesh", "2 2 3", "VxVyVz", {"5 6", "5 6", "5 6"}), "other numbers of coordinates"},
-      {grid_of("3DSMesh", "2 2 2", "XYZ", {"0 0 0  1 0 0"}), "another number of points"}};
-  for (const auto& [grid, words] : table) {
-    const std::string text = grid_document(grid);
-    EXPECT_THAT(error_of([&] { read(folder, text); }), HasSubstr(words));
-  }
 }
 
 }  // namespace
