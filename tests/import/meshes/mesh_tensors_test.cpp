@@ -1,9 +1,6 @@
 #include "tools/import/meshes/mesh_tensors.h"
 
-#include <vtkCellData.h>
-#include <vtkImageData.h>
-#include <vtkPointData.h>
-#include <vtkRectilinearGrid.h>
+#include <map>
 
 #include "tests/import/mesh_files.h"
 #include "tests/import/velocity_meshes.h"
@@ -18,6 +15,11 @@ using namespace mesh_fixtures;
 Matrix3d tensor_at(vtkDataSet& mesh, vtkIdType point) {
   auto* const array = vtkDoubleArray::SafeDownCast(mesh.GetPointData()->GetArray(tensor_array));
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(array->GetPointer(9 * point));
+}
+
+/// Adds a point array with the number that `value` returns at each point.
+void add_numbers(vtkDataSet& mesh, const std::string& name, const std::function<double(const Vector3d&)>& value) {
+  add_array<1>(mesh, name, [&](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(value(p)); });
 }
 
 void add_linear_velocity(vtkDataSet& mesh) { add_array<3>(mesh, "velocity", linear); }
@@ -92,8 +94,8 @@ Matrix3d symmetric(const Vector3d& p) { return linear_tensor(p) + linear_tensor(
 Grid cube_with_components(Matrix3d (*tensor)(const Vector3d&)) {
   const Grid mesh = unit_cube(VTK_HEXAHEDRON, 2, unchanged);
   for (int i = 0; i < 9; ++i)
-    add_array<1>(*mesh, std::string("s") + "xyz"[i / 3] + "xyz"[i % 3],
-                 [&](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(tensor(p)(i / 3, i % 3)); });
+    add_numbers(*mesh, std::string("s") + "xyz"[i / 3] + "xyz"[i % 3],
+                [&](const Vector3d& p) { return tensor(p)(i / 3, i % 3); });
   return mesh;
 }
 
@@ -159,38 +161,30 @@ TEST(ComponentArrays, ErrorsNameTheArrayAndListTheOthers) {
 }
 
 // Meshes in a plane become slabs of one voxel.
-/// The square from 0 to 4 as 8 × 8 cells of a type, in a plane across `axis` at 1.5.
-Grid square(int cell_type, int axis = 2, int n = 8) {
+/// The points of cells of a type that are a square, by their places in 3 x 3, row by row. Of two, one is clockwise.
+const std::map<int, std::vector<std::vector<int>>> cells_of_square{
+    {VTK_QUAD, {{0, 2, 8, 6}}},
+    {VTK_TRIANGLE, {{0, 2, 8}, {0, 6, 8}}},
+    {VTK_POLYGON, {{0, 1, 2, 8, 6}}},
+    {VTK_QUADRATIC_QUAD, {{0, 2, 8, 6, 1, 5, 7, 3}}},
+    {VTK_QUADRATIC_TRIANGLE, {{0, 2, 6, 1, 4, 3}, {2, 6, 8, 4, 7, 5}}}};
+
+/// The square from 0 to 4 as 8 x 8 squares of cells of a type, in a plane across `axis` at 1.5.
+Grid square(int cell_type, int axis = 2) {
   auto grid = Grid::New();
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   grid->SetPoints(points);
-  const auto at = [&](double i, double j) {
-    Vector3d p = Vector3d::Constant(1.5);
-    p[(axis + 1) % 3] = 4 * i / n;
-    p[(axis + 2) % 3] = 4 * j / n;
-    return points->InsertNextPoint(p.data());
-  };
-  const auto cell = [&](std::vector<vtkIdType> ids) {
-    grid->InsertNextCell(cell_type, static_cast<vtkIdType>(ids.size()), ids.data());
-  };
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) {
-      const double x = i, y = j;
-      if (cell_type == VTK_QUAD) cell({at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)});
-      if (cell_type == VTK_TRIANGLE) {
-        cell({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
-        cell({at(x, y + 1), at(x, y), at(x + 1, y + 1)});  // one of them clockwise
+  for (int i = 0; i < 8 * 8; ++i)
+    for (const std::vector<int>& places : cells_of_square.at(cell_type)) {
+      vtkNew<vtkIdList> ids;
+      for (const int place : places) {
+        Vector3d p = Vector3d::Constant(1.5);
+        p[(axis + 1) % 3] = 0.5 * (i / 8) + 0.25 * (place % 3);
+        p[(axis + 2) % 3] = 0.5 * (i % 8) + 0.25 * (place / 3);
+        ids->InsertNextId(points->InsertNextPoint(p.data()));
       }
-      if (cell_type == VTK_QUADRATIC_QUAD)
-        cell({at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1), at(x + 0.5, y), at(x + 1, y + 0.5),
-              at(x + 0.5, y + 1), at(x, y + 0.5)});
-      if (cell_type == VTK_QUADRATIC_TRIANGLE) {
-        cell({at(x, y), at(x + 1, y), at(x, y + 1), at(x + 0.5, y), at(x + 0.5, y + 0.5), at(x, y + 0.5)});
-        cell({at(x + 1, y), at(x, y + 1), at(x + 1, y + 1), at(x + 0.5, y + 0.5), at(x + 0.5, y + 1),
-              at(x + 1, y + 0.5)});
-      }
-      if (cell_type == VTK_POLYGON) cell({at(x, y), at(x + 0.5, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)});
+      grid->InsertNextCell(cell_type, ids);
     }
   return grid;
 }
@@ -203,34 +197,41 @@ Matrix3d plane_tensor(const Vector3d& p) {
   return (Matrix3d() << c[0], c[3], 0, c[3], c[1], 0, 0, 0, c[2]).finished();
 }
 
-/// Expects an error of the user's with these words.
-void refuses(const std::filesystem::path& file, const ImportSettings& settings, const std::string& words) {
-  EXPECT_THAT([&] { imported(file, settings); }, ThrowsMessage<std::invalid_argument>(HasSubstr(words)));
-}
-
 void expect_everywhere(const TensorGrid& grid, const std::function<Matrix3d(const Vector3d&)>& tensor) {
   for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& value) { EXPECT_LT((value - tensor(p)).norm(), 1e-5); });
 }
 
-ImportSettings settings_of_plane(const char* array, double thickness) {
-  ImportSettings settings;
-  settings.array = array;
-  settings.order = TensorOrder::plane;
-  settings.thickness = thickness;
-  return settings;
-}
+class FlatMesh : public testing::Test {
+ protected:
+  void write(vtkDataSet& mesh) const { write_xml(mesh, folder_ / "a.xml"); }
+  Imported read() const { return imported(folder_ / "a.xml", settings_); }
 
-TEST(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
-  const TemporaryFolder folder;
+  /// Expects an error of the user's with the file and these words.
+  void refuses(const std::string& words) const {
+    EXPECT_THAT([&] { read(); }, ThrowsMessage<std::invalid_argument>(AllOf(HasSubstr("a.xml"), HasSubstr(words))));
+  }
+
+  /// Chooses the array S, of plane tensors.
+  void choose_plane(double thickness) {
+    settings_ = array_settings("S");
+    settings_.order = TensorOrder::plane;
+    settings_.thickness = thickness;
+  }
+
+  TemporaryFolder folder_;
+  ImportSettings settings_;
+};
+
+TEST_F(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
+  choose_plane(0.75);
+  settings_.sampling.resolution = 0.25;
   for (const int axis : {0, 1, 2})
-    for (const int type : {VTK_TRIANGLE, VTK_QUAD, VTK_POLYGON, VTK_QUADRATIC_TRIANGLE, VTK_QUADRATIC_QUAD}) {
+    for (const auto& [type, cells] : cells_of_square) {
       SCOPED_TRACE(std::to_string(type) + " across " + std::to_string(axis));
       const Grid mesh = square(type, axis);
-      add_array<4>(*mesh, "stress", plane);
-      write_xml(*mesh, folder / "a.vtu");
-      ImportSettings settings = settings_of_plane("stress", 0.75);
-      settings.sampling.resolution = 0.25;
-      const auto [grid, report] = imported(folder / "a.vtu", settings);
+      add_array<4>(*mesh, "S", plane);
+      write(*mesh);
+      const auto [grid, report] = read();
       EXPECT_EQ(report.thickness, 0.75);
       EXPECT_EQ(grid.active_voxels(), 17u * 17);
       const Eigen::AlignedBox3i box = grid.active_box();
@@ -243,126 +244,105 @@ TEST(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
     }
 }
 
-TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
-  const TemporaryFolder folder;
+TEST_F(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
   const Grid mesh = square(VTK_QUAD);
   add_array<4>(*mesh, "S", plane);
-  write_xml(*mesh, folder / "a.vtu");
-  ImportSettings settings;
-  refuses(folder / "a.vtu", settings, "no array suits");  // Four may be colours.
-  settings.array = "S";
-  refuses(folder / "a.vtu", settings, "plane (xx yy zz xy) or 2x2");
-  settings.order = TensorOrder::vtk;
-  EXPECT_THROW(imported(folder / "a.vtu", settings).grid, std::invalid_argument);
-  settings.order = TensorOrder::two_by_two;
-  for_each_voxel(imported(folder / "a.vtu", settings).grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+  write(*mesh);
+  refuses("no array suits");  // Four may be colours.
+  settings_.array = "S";
+  refuses("plane (xx yy zz xy) or 2x2");
+  settings_.order = TensorOrder::vtk;
+  EXPECT_THROW(read(), std::invalid_argument);
+  settings_.order = TensorOrder::two_by_two;
+  expect_everywhere(read().grid, [](const Vector3d& p) {
     const Eigen::Vector4d c = plane(p);
-    EXPECT_LT((tensor - (Matrix3d() << c[0], c[1], 0, c[2], c[3], 0, 0, 0, 0).finished()).norm(), 1e-5);
+    return (Matrix3d() << c[0], c[1], 0, c[2], c[3], 0, 0, 0, 0).finished();
   });
   const char* const names[] = {"XX", "YY", "ZZ", "XY"};
   for (int i = 0; i < 4; ++i) mesh->GetPointData()->GetArray("S")->SetComponentName(i, names[i]);
-  write_xml(*mesh, folder / "b.vtu");
-  settings.order.reset();
-  expect_everywhere(imported(folder / "b.vtu", settings).grid, plane_tensor);
+  write(*mesh);
+  settings_.order.reset();
+  expect_everywhere(read().grid, plane_tensor);
 }
 
-TEST(FlatMesh, ScalarArraysOfAPlaneAreJoined) {
-  const TemporaryFolder folder;
+TEST_F(FlatMesh, ScalarArraysOfAPlaneAreJoined) {
   const Grid mesh = square(VTK_QUAD);
   const char* const names[] = {"sxx", "syy", "szz", "sxy"};
-  for (int i = 0; i < 4; ++i)
-    add_array<1>(*mesh, names[i], [i](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(plane(p)[i]); });
-  write_xml(*mesh, folder / "a.vtu");
-  for (const bool with_zz : {false, true}) {
-    ImportSettings settings;
-    settings.array = with_zz ? "sxy,szz,sxx,syy" : "sxx,syy,sxy";
-    for_each_voxel(imported(folder / "a.vtu", settings).grid, [&](const Vector3d& p, const Matrix3d& tensor) {
-      Matrix3d expected = plane_tensor(p);
-      if (!with_zz) expected(2, 2) = 0;
-      EXPECT_LT((tensor - expected).norm(), 1e-5);
-    });
-  }
-  ImportSettings settings;
-  settings.array = "sxx,syy,szz";
-  refuses(folder / "a.vtu", settings, "xx, yy, xy");
+  for (int i = 0; i < 4; ++i) add_numbers(*mesh, names[i], [i](const Vector3d& p) { return plane(p)[i]; });
+  write(*mesh);
+  settings_.array = "sxx,syy,sxy";
+  expect_everywhere(read().grid, [](const Vector3d& p) {
+    Matrix3d expected = plane_tensor(p);
+    expected(2, 2) = 0;
+    return expected;
+  });
+  settings_.array = "sxy,szz,sxx,syy";
+  expect_everywhere(read().grid, plane_tensor);
+  settings_.array = "sxx,syy,szz";
+  refuses("xx, yy, xy");
 }
 
-TEST(FlatMesh, FlatImagesAndRectilinearGrids) {
-  const TemporaryFolder folder;
+TEST_F(FlatMesh, FlatImagesAndRectilinearGrids) {
   vtkNew<vtkImageData> image;
   image->SetDimensions(5, 4, 1);
   add_array<4>(*image, "S", plane);
-  write_xml(*image, folder / "a.vti");
-  ImportSettings settings = settings_of_plane("S", 3);
-  const TensorGrid voxels = imported(folder / "a.vti", settings).grid;
+  choose_plane(3);
+  write(*image);
+  const TensorGrid voxels = read().grid;
   EXPECT_EQ(voxels.active_voxels(), 20u);
   EXPECT_EQ(voxels.to_world.linear()(2, 2), 3);
   expect_everywhere(voxels, plane_tensor);
 
   const auto rectilinear = rectilinear_grid({0, 1, 4}, {0, 1, 4}, {2});
   add_array<4>(*rectilinear, "S", plane);
-  write_xml(*rectilinear, folder / "a.vtr");
-  settings.sampling.resolution = 0.5;
-  EXPECT_EQ(imported(folder / "a.vtr", settings).voxels(), 81u);
+  settings_.sampling.resolution = 0.5;
+  write(*rectilinear);
+  EXPECT_EQ(read().voxels(), 81u);
 }
 
-TEST(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
-  const TemporaryFolder folder;
-  ImportSettings settings;
-  const Grid bent_square = square(VTK_QUAD);
-  for (vtkIdType i = 0; i < bent_square->GetNumberOfPoints(); ++i) {
-    Vector3d p(bent_square->GetPoint(i));
-    p.z() += 0.1 * p.x();
-    bent_square->GetPoints()->SetPoint(i, p.data());
-  }
-  add_array<9>(*bent_square, "T", [](const Vector3d& p) { return flat(linear_tensor(p)); });
-  write_xml(*bent_square, folder / "bent.vtu");
-  EXPECT_THAT(
-      [&] { imported(folder / "bent.vtu", settings).grid; },
-      ThrowsMessage<std::invalid_argument>(testing::AllOf(HasSubstr("bent.vtu"), HasSubstr("surface in space"))));
-  settings.thickness = 1;
-  write_xml(*bar(0, 3), folder / "solid.vtu");
-  refuses(folder / "solid.vtu", settings, "--thickness");
-  write_xml(*image(), folder / "solid.vti");
-  refuses(folder / "solid.vti", settings, "--thickness");
+TEST_F(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
+  const auto tilted = curvilinear({9, 9, 1}, [](const Vector3d& p) { return Vector3d(p.x(), p.y(), 0.1 * p.x()); });
+  add_array<9>(*tilted, "T", [](const Vector3d& p) { return flat(linear_tensor(p)); });
+  write(*tilted);
+  refuses("surface in space");
+  settings_.thickness = 1;
+  write(*bar(0, 3));
+  refuses("--thickness");
+  write(*image());
+  refuses("--thickness");
 }
 
 /// Images keep their voxels, and are fields of a plane as meshes are.
-TEST(FlatMesh, VectorsOfImagesMayHaveTwoComponents) {
-  const TemporaryFolder folder;
-  auto image = vtkSmartPointer<vtkImageData>::New();
+TEST_F(FlatMesh, VectorsOfImagesMayHaveTwoComponents) {
+  const auto image = vtkSmartPointer<vtkImageData>::New();
   image->SetDimensions(5, 4, 1);
-  add_array<2>(*image, "v",
-               [](const Vector3d& p) { return Eigen::Vector2d(2 * p.x() + 3 * p.y(), 5 * p.x() - p.y()); });
-  add_array<1>(*image, "u", [](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(2 * p.x() + 3 * p.y()); });
-  add_array<1>(*image, "w", [](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(5 * p.x() - p.y()); });
-  write_xml(*image, folder / "a.vti");
+  const auto v = [](const Vector3d& p) { return Vector2d(2 * p.x() + 3 * p.y(), 5 * p.x() - p.y()); };
+  add_array<2>(*image, "v", v);
+  add_numbers(*image, "u", [&](const Vector3d& p) { return v(p).x(); });
+  add_numbers(*image, "w", [&](const Vector3d& p) { return v(p).y(); });
+  write(*image);
   const Matrix3d expected = (Matrix3d() << 2, 3, 0, 5, -1, 0, 0, 0, 0).finished();
   for (const char* array : {"v", "u,w"})
     for (const bool sampled : {false, true}) {
-      ImportSettings settings;
-      settings.array = array;
-      settings.take = Take::gradient;
-      if (sampled) settings.sampling.resolution = 0.5;
-      const TensorGrid grid = imported(folder / "a.vti", settings).grid;
+      settings_ = array_settings(array, Take::gradient, sampled ? 0.5 : 0);
+      const TensorGrid grid = read().grid;
       EXPECT_EQ(grid.active_voxels(), sampled ? 9u * 7 : 5u * 4);
       expect_everywhere(grid, [&](const Vector3d&) { return expected; });
     }
 }
 
-TEST(FlatMesh, TheThicknessIsNoEdgeThatIsDivided) {
-  const TemporaryFolder folder;
+TEST_F(FlatMesh, TheThicknessIsNoEdgeThatIsDivided) {
   const Grid mesh = square(VTK_QUAD);
-  add_array<4>(*mesh, "stress", plane);
-  write_xml(*mesh, folder / "a.vtu");
-  ImportSettings settings = settings_of_plane("stress", 100);
-  for (const auto& resolution : {decltype(settings.sampling.resolution)(17), {Vector3i(17, 17, 1)}}) {
-    settings.sampling.resolution = resolution;
-    EXPECT_EQ(imported(folder / "a.vtu", settings).voxels(), 17u * 17);
+  add_array<4>(*mesh, "S", plane);
+  write(*mesh);
+  choose_plane(100);
+  for (const auto& resolution : {decltype(settings_.sampling.resolution)(17), {Vector3i(17, 17, 1)}}) {
+    settings_.sampling.resolution = resolution;
+    EXPECT_EQ(read().voxels(), 17u * 17);
   }
-  settings.sampling.resolution = {};
-  settings.sampling.bounds = Eigen::AlignedBox3d(Vector3d(1, 1, 0), Vector3d(1.25, 1.25, 0));  // Half of an edge.
-  EXPECT_EQ(imported(folder / "a.vtu", settings).voxels(), 4u);
+  settings_.sampling.resolution = {};
+  settings_.sampling.bounds = AlignedBox3d(Vector3d(1, 1, 0), Vector3d(1.25, 1.25, 0));  // Half of an edge.
+  EXPECT_EQ(read().voxels(), 4u);
 }
 
 }  // namespace
