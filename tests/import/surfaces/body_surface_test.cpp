@@ -4,8 +4,6 @@
 
 #include <set>
 
-#include <vtkCellData.h>
-
 #include "renderer/meshes/mesh.h"
 #include "tests/import/cell_types.h"
 #include "tests/import/mesh_files.h"
@@ -35,20 +33,16 @@ Vector3d to_plate(const Vector3d& p) {
   return {(1 + p.y()) * std::cos(angle), (1 + p.y()) * std::sin(angle), p.z()};
 }
 
+bool is_pyramid(int type) {
+  return type == VTK_PYRAMID || type == VTK_QUADRATIC_PYRAMID || type == VTK_TRIQUADRATIC_PYRAMID;
+}
+
 /// The corners, in a cube, of the cells of a kind that fill it.
 std::vector<std::vector<std::size_t>> cells_in_cube(int type) {
-  switch (static_cast<int>(std::lround(24 * parametric_volume({type})))) {
-    case 4:  // 1/6
-      if (type == VTK_TRIQUADRATIC_PYRAMID) break;
-      return {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
-    case 12:
-      return {{0, 1, 3, 4}, {2, 3, 1, 6}};
-    case 24:
-      return {{0, 1, 3, 4}};
-    default:
-      break;
-  }
-  return {{0, 1, 3, 8}, {7, 6, 4, 8}, {0, 4, 1, 8}, {1, 5, 2, 8}, {2, 6, 3, 8}, {3, 7, 0, 8}};  // Pyramids.
+  if (is_pyramid(type)) return {{0, 1, 3, 8}, {7, 6, 4, 8}, {0, 4, 1, 8}, {1, 5, 2, 8}, {2, 6, 3, 8}, {3, 7, 0, 8}};
+  if (parametric_volume({type}) == 1) return {{0, 1, 3, 4}};
+  if (parametric_volume({type}) == 0.5) return {{0, 1, 3, 4}, {2, 3, 1, 6}};  // Wedges.
+  return {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
 }
 
 /// The unit cube, divided into n³ cubes of cells of a kind, moved by `map`.
@@ -63,11 +57,10 @@ Grid divided(const CellKind& kind, int n, const Map& map) {
   const auto frame = [](const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
     return (Matrix3d() << b - a, c - a, d - a).finished();
   };
+  const bool is_simplex = parametric_volume(kind) < 0.6 && !is_pyramid(kind.type);  // A wedge begins as one.
+  const std::size_t third = is_simplex || kind.type == VTK_VOXEL ? 2 : 3, fourth = is_simplex ? 3 : 4;
   for (int cube = 0; cube < n * n * n; ++cube)
     for (const std::vector<std::size_t>& cell : cells_in_cube(kind.type)) {
-      const bool is_simplex =
-          cell.size() == 4 && parametric_volume(kind) < 0.6 && at.size() != 5 && at.size() != 13 && at.size() != 19;
-      const std::size_t third = is_simplex ? 2 : kind.type == VTK_VOXEL ? 2 : 3, fourth = is_simplex ? 3 : 4;
       const Matrix3d to_cube = frame(corners[cell[0]], corners[cell[1]], corners[cell[2]], corners[cell[3]]) *
                                frame(at[0], at[1], at[third], at[fourth]).inverse();
       vtkNew<vtkIdList> ids;
@@ -89,32 +82,17 @@ int euler_characteristic(const TriangleMesh& mesh) {
   return static_cast<int>(vertices.size()) - static_cast<int>(mesh.triangles.size()) / 2;
 }
 
-struct Body {
-  const char* name;
-  Map map;
-  double volume, area;
-  int euler;
-};
-
-std::vector<Body> bodies() {
-  return {{"box", unchanged, 1, 6, 2},
-          {"ball", to_ball, 4 * pi / 3, 4 * pi, 2},
-          {"plate", to_plate, 3 * pi, 6 * pi + 6 * pi, 0}};
-}
-
 int order_of(const CellKind& kind) {
   if (is_higher_order(kind.type)) return kind.order;
-  if (kind.type == VTK_QUADRATIC_LINEAR_WEDGE) return 1;
-  return points_of(kind) > 8 && kind.type != VTK_PENTAGONAL_PRISM && kind.type != VTK_HEXAGONAL_PRISM ? 2 : 1;
+  return points_of(kind) > 8 && kind.type != VTK_QUADRATIC_LINEAR_WEDGE ? 2 : 1;
 }
 
 std::vector<CellKind> kinds_that_fill_cubes() {
-  std::vector<CellKind> kinds = solid_cell_kinds();
-  const auto fills_none = [](const CellKind& kind) {
-    return kind.type == VTK_PENTAGONAL_PRISM || kind.type == VTK_HEXAGONAL_PRISM || kind.type == VTK_CONVEX_POINT_SET ||
-           kind.type == VTK_POLYHEDRON;
-  };
-  kinds.erase(std::remove_if(kinds.begin(), kinds.end(), fills_none), kinds.end());
+  std::vector<CellKind> kinds;
+  for (const CellKind& kind : solid_cell_kinds())
+    if (kind.type != VTK_PENTAGONAL_PRISM && kind.type != VTK_HEXAGONAL_PRISM && kind.type != VTK_CONVEX_POINT_SET &&
+        kind.type != VTK_POLYHEDRON)
+      kinds.push_back(kind);
   return kinds;
 }
 
@@ -133,25 +111,26 @@ TEST_P(BodySurfaceOf, OneCellIsItsOwn) {
 
 TEST_P(BodySurfaceOfMany, HasTheVolumeAndAreaOfTheBody) {
   const int type = GetParam().type;
-  const bool is_bezier = type >= VTK_BEZIER_CURVE && type <= VTK_BEZIER_PYRAMID;
-  for (const Body& body : bodies()) {
-    if (type == VTK_VOXEL && body.name != std::string("box")) continue;
-    if ((type == VTK_PYRAMID || type == VTK_QUADRATIC_PYRAMID) && body.name == std::string("plate"))
-      continue;  // They fold.
-    SCOPED_TRACE(body.name);
+  const bool is_off = type >= VTK_BEZIER_CURVE && type <= VTK_BEZIER_PYRAMID && GetParam().order > 1;
+  const auto check = [&](const std::string& name, const Map& map, double volume, double area, int euler) {
+    SCOPED_TRACE(name);
     // Flat faces, and points that are not on the surface, need few cells; curved faces as many as the tolerance asks.
-    const bool is_box = body.name == std::string("box"), is_off = is_bezier && GetParam().order > 1;
-    if (is_off && body.name == std::string("plate")) continue;  // It folds, too.
+    const bool is_box = name == "box";
     const int n = is_box || is_off ? 2 : GetParam().order > 3 ? 4 : 6;
-    const BodySurface surface = surface_of(*divided(GetParam(), n, body.map), 1e-3);
+    const BodySurface surface = surface_of(*divided(GetParam(), n, map), 1e-3);
     EXPECT_EQ(surface.open_edges, 0u);
     EXPECT_EQ(surface.inner_faces, 0u);
-    EXPECT_EQ(euler_characteristic(surface.mesh), body.euler);
-    if (is_off && !is_box) continue;
+    EXPECT_EQ(euler_characteristic(surface.mesh), euler);
+    if (is_off && !is_box) return;
     const double error = is_box ? 1e-9 : order_of(GetParam()) == 1 ? 0.2 : 6e-3;
-    EXPECT_NEAR(surface.mesh.volume(), body.volume, error * body.volume);
-    EXPECT_NEAR(surface.area, body.area, error * body.area);
-  }
+    EXPECT_NEAR(surface.mesh.volume(), volume, error * volume);
+    EXPECT_NEAR(surface.area, area, error * area);
+  };
+  check("box", unchanged, 1, 6, 2);
+  if (type == VTK_VOXEL) return;
+  check("ball", to_ball, 4 * pi / 3, 4 * pi, 2);
+  if (is_off || type == VTK_PYRAMID || type == VTK_QUADRATIC_PYRAMID) return;  // They fold.
+  check("plate", to_plate, 3 * pi, 12 * pi, 0);
 }
 
 std::string kind_name(const ::testing::TestParamInfo<CellKind>& test) { return name_of(test.param); }
@@ -175,12 +154,9 @@ TEST(BodySurface, CurvedCellsAreDividedAsTheToleranceSays) {
 }
 
 /// Cells of a grid that `is_used` chooses by their number, with its points.
-Grid some_cells(vtkDataSet& mesh, const std::function<bool(vtkIdType)>& is_used) {
+Grid some_cells(vtkPointSet& mesh, const std::function<bool(vtkIdType)>& is_used) {
   auto grid = Grid::New();
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (vtkIdType i = 0; i < mesh.GetNumberOfPoints(); ++i) points->InsertNextPoint(mesh.GetPoint(i));
-  grid->SetPoints(points);
+  grid->SetPoints(mesh.GetPoints());
   vtkNew<vtkIdList> ids;
   for (vtkIdType i = 0; i < mesh.GetNumberOfCells(); ++i) {
     if (!is_used(i)) continue;
@@ -192,25 +168,22 @@ Grid some_cells(vtkDataSet& mesh, const std::function<bool(vtkIdType)>& is_used)
 
 TEST(BodySurface, InnerFacesAreCountedAndThoseWithOtherDiagonalsAreGone) {
   const auto beside = [](const Vector3d& p) { return Vector3d(1 + p.x(), 1 - p.y(), p.z()); };
-  const CellKind hexes{VTK_HEXAHEDRON}, tetras{VTK_TETRA}, curved{VTK_QUADRATIC_TETRA};
-  struct Case {
-    Grid first, second;
-    std::size_t inner, triangles;
-  };
-  for (const Case& c : {Case{divided(hexes, 2, unchanged), divided(hexes, 2, beside), 0, 80},
-                        Case{divided(tetras, 2, unchanged), divided(tetras, 2, beside), 16, 80},
-                        Case{divided(curved, 2, unchanged), divided(curved, 2, beside), 16, 80},
-                        Case{divided(hexes, 2, unchanged), divided(tetras, 2, beside), 12, 80},
-                        Case{divided(curved, 2, unchanged), divided(hexes, 2, beside), 12, 80},
-                        Case{divided(hexes, 2, unchanged), divided(hexes, 3, beside), 4 + 9, 48 + 108}}) {
-    const auto mesh = one_data_set({c.first, c.second});
-    const BodySurface surface = surface_of(*mesh, 0.01);
-    EXPECT_EQ(surface.inner_faces, c.inner);
-    EXPECT_EQ(surface.mesh.triangles.size(), c.triangles);
+  const auto check = [&](int first, int second, int n, std::size_t inner, std::size_t triangles) {
+    SCOPED_TRACE(testing::Message() << first << " beside " << second << " " << n);
+    const BodySurface surface =
+        surface_of(*one_data_set({divided({first}, 2, unchanged), divided({second}, n, beside)}), 0.01);
+    EXPECT_EQ(surface.inner_faces, inner);
+    EXPECT_EQ(surface.mesh.triangles.size(), triangles);
     EXPECT_EQ(surface.open_edges, 0u);
     EXPECT_NEAR(surface.mesh.volume(), 2, 1e-12);
     EXPECT_NEAR(surface.area, 10, 1e-12);
-  }
+  };
+  check(VTK_HEXAHEDRON, VTK_HEXAHEDRON, 2, 0, 80);
+  check(VTK_TETRA, VTK_TETRA, 2, 16, 80);
+  check(VTK_QUADRATIC_TETRA, VTK_QUADRATIC_TETRA, 2, 16, 80);
+  check(VTK_HEXAHEDRON, VTK_TETRA, 2, 12, 80);
+  check(VTK_QUADRATIC_TETRA, VTK_HEXAHEDRON, 2, 12, 80);
+  check(VTK_HEXAHEDRON, VTK_HEXAHEDRON, 3, 4 + 9, 48 + 108);
 }
 
 TEST(BodySurface, CellsOfAnySenseLookOutwards) {
@@ -233,11 +206,10 @@ TEST(BodySurface, TheBodyEndsWhereTheDataEnd) {
     std::function<void(vtkStructuredGrid&, vtkDataArray&, vtkDataArray&)> spoil;  // Tensors at points, cells.
     int missing, euler;
   };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Case& c : {Case{"all", [](auto&, auto&, auto&) {}, 0, 2},
-                        Case{"corner", [&](auto&, auto&points, auto&) { points.SetComponent(0, 3, nan); }, 1, 2},
-                        Case{"node", [&](auto&, auto&points, auto&) { points.SetComponent(43, 3, nan); }, 8, 2},
-                        Case{"cell", [&](auto&, auto&, auto&cells) { cells.SetComponent(31, 8, nan); }, 1, 4},
+                        Case{"corner", [](auto&, auto&points, auto&) { points.SetComponent(0, 3, NAN); }, 1, 2},
+                        Case{"node", [](auto&, auto&points, auto&) { points.SetComponent(43, 3, NAN); }, 8, 2},
+                        Case{"cell", [](auto&, auto&, auto&cells) { cells.SetComponent(31, 8, NAN); }, 1, 4},
                         Case{"blanked", [](auto&mesh, auto&, auto&) { mesh.BlankCell(31); }, 1, 4},
                         Case{"hidden", [](auto&mesh, auto&, auto&) { mesh.BlankPoint(43); }, 8, 2}}) {
     SCOPED_TRACE(c.name);
@@ -265,12 +237,13 @@ TEST(BodySurface, SlabsHaveTopBottomAndWallsAlsoInHoles) {
 
 TEST(BodySurface, ABoxCutsIt) {
   const BodySurface ball = surface_of(*divided({VTK_QUADRATIC_HEXAHEDRON}, 6, to_ball), 1e-3);
-  const TriangleMesh half = cut_to(ball.mesh, {Vector3d(0, -2, -2), Vector3d(2, 2, 2)});
-  EXPECT_EQ(open_edges(half), 0u);
-  EXPECT_NEAR(half.volume(), ball.mesh.volume() / 2, 1e-9);
-  const TriangleMesh cap = cut_to(ball.mesh, {Vector3d(0.5, -2, -2), Vector3d(2, 2, 2)});
-  EXPECT_EQ(open_edges(cap), 0u);
-  EXPECT_NEAR(cap.volume(), pi * 0.25 * 2.5 / 3, 3e-3);
+  const auto check = [&](double from_x, double volume, double tolerance) {
+    const TriangleMesh cap = cut_to(ball.mesh, {Vector3d(from_x, -2, -2), Vector3d(2, 2, 2)});
+    EXPECT_EQ(open_edges(cap), 0u);
+    EXPECT_NEAR(cap.volume(), volume, tolerance);
+  };
+  check(0, ball.mesh.volume() / 2, 1e-9);
+  check(0.5, pi * 0.25 * 2.5 / 3, 3e-3);
 }
 
 TEST(BodySurface, ImportGivesItToGridsOfMeshes) {
@@ -282,7 +255,7 @@ TEST(BodySurface, ImportGivesItToGridsOfMeshes) {
     std::function<void(ImportSettings&)> set = [](ImportSettings&) {};
   };
   const auto crop = [](ImportSettings& s) {
-    s.sampling.bounds = Eigen::AlignedBox3d(Vector3d(1.5, 0, 0), Vector3d(9, 9, 0.5));
+    s.sampling.bounds = AlignedBox3d(Vector3d(1.5, 0, 0), Vector3d(9, 9, 0.5));
   };
   for (const Row& row : {Row{bar(0, 3), "a.vtu", 3},
                          {bar(0, 3), "a.vtu", 0.75, crop},
@@ -313,7 +286,7 @@ TEST(MeshBoundary, AHoleIsAClosedSurfaceThatLooksOutOfTheBody) {
   EXPECT_EQ(mesh.vertices.size(), 26u);  // shared, although each cell has its own points
   EXPECT_EQ(mesh.triangles.size(), 48u);
   EXPECT_NEAR(mesh.volume(), 8, 1e-12);
-  EXPECT_TRUE(mesh.bounds().isApprox(Eigen::AlignedBox3d(Vector3d(-1, -1, -1), Vector3d(1, 1, 1))));
+  EXPECT_TRUE(mesh.bounds().isApprox(AlignedBox3d(Vector3d(-1, -1, -1), Vector3d(1, 1, 1))));
   EXPECT_NO_THROW(require_closed(mesh));
 }
 
@@ -338,7 +311,7 @@ TEST(MeshBoundary, RefusesFlatMeshesAndFoldersThatAreMissing) {
   const auto flat_mesh = curvilinear({3, 3, 1}, [](const Vector3d& p) { return Vector3d(p.x(), p.y(), 0); });
   EXPECT_THROW(write_boundary(*flat_mesh, Temporary("flat.ply")), std::invalid_argument);
   EXPECT_THAT([] { write_boundary(*shell(1), "/no/such/folder/body.ply"); },
-              ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("/no/such/folder/body.ply")));
+              ThrowsMessage<std::runtime_error>(HasSubstr("/no/such/folder/body.ply")));
 }
 
 }  // namespace

@@ -1,27 +1,18 @@
 // Paths as VTK polydata: written and read by the program through `tensorray-import`, and damaged files.
 
-#include <limits>
 #include <random>
 #include <set>
 
-#include <vtkCell.h>
 #include <vtkCellArray.h>
-#include <vtkCellData.h>
-#include <vtkDataArray.h>
-#include <vtkDoubleArray.h>
 #include <vtkFieldData.h>
 #include <vtkFloatArray.h>
-#include <vtkImageData.h>
-#include <vtkMatrix3x3.h>
-#include <vtkNew.h>
-#include <vtkPointData.h>
-#include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkStringArray.h>
 #include <vtkXMLPolyDataReader.h>
 
 #include "integrators/path_files/path_files.h"
-#include "tests/import/mesh_files.h"
+#include "tests/import/velocity_meshes.h"
+#include "tests/import/vtk_files.h"
 #include "tests/tracing/path_support.h"
 #include "tests/volumes/point_support.h"
 #include "tools/import/vtk_formats/image_lattice.h"
@@ -31,14 +22,10 @@
 namespace tensorray {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// Reads a file with these bytes, and expects that nothing is written to the terminal meanwhile.
 /// @return the error message; empty if the file was read.
 std::string error_of_bytes(const std::string& bytes) {
-  const TemporaryFolder folder;
-  const std::filesystem::path file = folder / "a.vtp";
-  write_bytes(file, bytes);
+  const Temporary file("a.vtp", bytes);
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
   const std::string text = error_of([&] { read_paths(file); });
@@ -50,17 +37,23 @@ std::string error_of_bytes(const std::string& bytes) {
 }
 
 std::string written(const std::vector<Path>& paths) {
-  const TemporaryFolder folder;
-  write_paths(folder / "a.vtp", paths);
-  return bytes_of(folder / "a.vtp");
+  const Temporary file("a.vtp");
+  write_paths(file, paths);
+  return bytes_of(file);
 }
 
 /// Whether VTK reads a file with these bytes: in a child process, which is faster than to start the program.
 bool is_taken(const std::string& bytes) {
-  const TemporaryFolder folder;
-  write_bytes(folder / "a.vtp", bytes);
+  const Temporary file("a.vtp", bytes);
   const std::set<std::string> names{"direction", "length", "tensor", "change", "in_field", "wavelength", "end"};
-  return error_in_child(folder / "a.vtp", [&] { read_vtp_file(folder / "a.vtp", names); }).empty();
+  return error_in_child(file, [&] { read_vtp_file(file, names); }).empty();
+}
+
+vtkSmartPointer<vtkPolyData> read_by_vtk(const std::filesystem::path& file) {
+  vtkNew<vtkXMLPolyDataReader> reader;
+  reader->SetFileName(file.c_str());
+  reader->Update();
+  return reader->GetOutput();
 }
 
 /// A file as other programs write it: two lines that share a point, and also a vertex and a triangle.
@@ -80,9 +73,9 @@ std::string foreign_vtp(const std::string& connectivity = "0 1 2 2 3") {
 
 TEST(VtpPathsTest, ReadBackExactly) {
   const std::vector<Path> paths = some_paths(12);
-  const TemporaryFolder folder;
-  write_paths(folder / "a.vtp", paths);
-  expect_same(read_paths(folder / "a.vtp"), without_empty(paths));
+  const Temporary file("a.vtp");
+  write_paths(file, paths);
+  expect_same(read_paths(file), without_empty(paths));
 }
 
 TEST(VtpPathsTest, CutFilesFail) {
@@ -106,9 +99,7 @@ TEST(VtpPathsTest, DamagedFilesNeverCrash) {
 }
 
 TEST(VtpPathsTest, LinesOfOtherPrograms) {
-  const TemporaryFolder folder;
-  write_bytes(folder / "a.vtp", foreign_vtp());
-  const std::vector<Path> paths = read_paths(folder / "a.vtp");
+  const std::vector<Path> paths = read_paths(Temporary("a.vtp", foreign_vtp()));
   ASSERT_EQ(paths.size(), 2u);
   EXPECT_EQ(paths[0].wavelength, 450);
   EXPECT_EQ(paths[1].wavelength, 650);
@@ -124,45 +115,41 @@ TEST(VtpPathsTest, LinesOfOtherPrograms) {
 }
 
 TEST(VtpPathsTest, ErrorsNameTheFix) {
-  const std::string foreign = foreign_vtp();
-  const auto error = [](const std::string& content) { return error_of_bytes(content); };
-  EXPECT_THAT(error("solid nothing of the kind\n"), HasSubstr("not VTK polydata"));
-  EXPECT_THAT(error(replaced(foreign, "type=\"PolyData\"", "type=\"Image\nData\"")),
-              HasSubstr("not VTK polydata but \"Image\\nData\""));
-  EXPECT_THAT(error(foreign_vtp("0 1 2 2 4")), HasSubstr("not there"));
-  EXPECT_THAT(error(foreign_vtp("0 1 2 2 -1")), HasSubstr("not there"));
-  EXPECT_THAT(error(foreign_vtp("0 1 2 2")), HasSubstr("damaged"));
-  EXPECT_THAT(error(replaced(foreign, "3 5<", "3 9000000000000000000<")), HasSubstr("damaged"));
-  EXPECT_THAT(error(replaced(foreign, "3 5<", "3 2000000000<")), HasSubstr("damaged"));
-  EXPECT_THAT(error(replaced(foreign, "3 5<", "5 3<")), testing::Not(""));
-  EXPECT_THAT(error(replaced(foreign, "1 0 0", "1 nan 0")), testing::Not(""));
-  EXPECT_THAT(error(replaced(foreign, "NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\"")), HasSubstr("damaged"));
-  for (const char* count : {"2000000000", "-9"})
-    EXPECT_THAT(
-        error(replaced(foreign, "NumberOfComponents=\"3\"", std::string("NumberOfComponents=\"") + count + "\"")),
-        testing::Not(""));
-  EXPECT_THAT(error(replaced(foreign, "NumberOfLines=\"2\"", "NumberOfLines=\"0\"")), HasSubstr("no path"));
+  EXPECT_THAT(error_of_bytes("solid nothing of the kind\n"), HasSubstr("not VTK polydata"));
+  for (const char* connectivity : {"0 1 2 2 4", "0 1 2 2 -1"})
+    EXPECT_THAT(error_of_bytes(foreign_vtp(connectivity)), HasSubstr("not there")) << connectivity;
+  EXPECT_THAT(error_of_bytes(foreign_vtp("0 1 2 2")), HasSubstr("damaged"));
+  struct Row {
+    const char *from, *to, *words;  ///< Empty words: any error.
+  };
+  for (const Row& row : {Row{"type=\"PolyData\"", "type=\"Image\nData\"", "not VTK polydata but \"Image\\nData\""},
+                         {"3 5<", "3 9000000000000000000<", "damaged"},
+                         {"3 5<", "3 2000000000<", "damaged"},
+                         {"3 5<", "5 3<", ""},
+                         {"1 0 0", "1 nan 0", ""},
+                         {"NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\"", "damaged"},
+                         {"NumberOfComponents=\"3\"", "NumberOfComponents=\"2000000000\"", ""},
+                         {"NumberOfComponents=\"3\"", "NumberOfComponents=\"-9\"", ""},
+                         {"NumberOfLines=\"2\"", "NumberOfLines=\"0\"", "no path"}})
+    EXPECT_THAT(error_of_bytes(replaced(foreign_vtp(), row.from, row.to)), AllOf(Not(""), HasSubstr(row.words)))
+        << row.to;
 
-  std::vector<Path> paths = some_paths(3);
-  paths[2].points[1].position.y() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(error(written(paths)), HasSubstr("point 3 of its lines is not finite"));
-  paths = some_paths(3);
-  paths[2].points[1].tensor(0, 1) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(error(written(paths)), HasSubstr("\"tensor\" has a value that is not finite"));
-  paths = some_paths(3);
-  paths[2].points[1].length = 0;
-  EXPECT_THAT(error(written(paths)), HasSubstr("\"length\" does not grow"));
+  const auto refuses = [](const std::function<void(PathPoint&)>& spoil, const char* words) {
+    std::vector<Path> paths = some_paths(3);
+    spoil(paths[2].points[1]);
+    EXPECT_THAT(error_of_bytes(written(paths)), HasSubstr(words));
+  };
+  refuses([](PathPoint& point) { point.position.y() = NAN; }, "point 3 of its lines is not finite");
+  refuses([](PathPoint& point) { point.tensor(0, 1) = NAN; }, "\"tensor\" has a value that is not finite");
+  refuses([](PathPoint& point) { point.length = 0; }, "\"length\" does not grow");
 }
 
 TEST(VtpPathsTest, PiecesThatDoNotHaveTheSameArrays) {
-  std::string piece = foreign_vtp();
-  const std::size_t begin = piece.find("<Piece"), end = piece.find("</PolyData>");
-  std::string both = piece;
-  both.insert(end, replaced(piece.substr(begin, end - begin), "wavelength", "wave_number"));
-  const TemporaryFolder folder;
-  write_bytes(folder / "a.vtp", both);
+  std::string both = foreign_vtp();
+  const std::size_t begin = both.find("<Piece"), end = both.find("</PolyData>");
+  both.insert(end, replaced(both.substr(begin, end - begin), "wavelength", "wave_number"));
   std::vector<Path> paths;
-  const std::string error = error_of([&] { paths = read_paths(folder / "a.vtp"); });
+  const std::string error = error_of([&] { paths = read_paths(Temporary("a.vtp", both)); });
   if (error.empty()) {
     ASSERT_EQ(paths.size(), 4u);
     for (const Path& path : paths) EXPECT_EQ(path.wavelength, Path().wavelength);
@@ -171,30 +158,28 @@ TEST(VtpPathsTest, PiecesThatDoNotHaveTheSameArrays) {
 
 TEST(VtpPathsTest, VtkReadsThem) {
   const std::vector<Path> paths = some_paths(4);
-  const TemporaryFolder files;
-  write_paths(files / "paths.vtp", paths);
-  vtkNew<vtkXMLPolyDataReader> reader;
-  reader->SetFileName((files / "paths.vtp").c_str());
-  reader->Update();
-  vtkPolyData& data = *reader->GetOutput();
-  vtkPointData& points = *data.GetPointData();
-  EXPECT_EQ(data.GetNumberOfPoints(), 14);
-  EXPECT_EQ(data.GetNumberOfLines(), 4);
-  EXPECT_EQ(data.GetNumberOfCells(), 4);
+  const Temporary file("paths.vtp");
+  write_paths(file, paths);
+  const auto data = read_by_vtk(file);
+  vtkPointData& points = *data->GetPointData();
+  vtkCellData& lines = *data->GetCellData();
+  EXPECT_EQ(data->GetNumberOfPoints(), 14);
+  EXPECT_EQ(data->GetNumberOfLines(), 4);
+  EXPECT_EQ(data->GetNumberOfCells(), 4);
   for (const char* name : {"backward_end", "end", "flexibility", "wavelength"})
-    EXPECT_TRUE(data.GetCellData()->HasArray(name)) << name;
-  auto* const names = vtkStringArray::SafeDownCast(data.GetFieldData()->GetAbstractArray("end_names"));
+    EXPECT_TRUE(lines.HasArray(name)) << name;
+  auto* const names = vtkStringArray::SafeDownCast(data->GetFieldData()->GetAbstractArray("end_names"));
   ASSERT_TRUE(names);
-  EXPECT_EQ(names->GetValue(static_cast<vtkIdType>(data.GetCellData()->GetArray("end")->GetTuple1(2))), "obstacle");
-  EXPECT_EQ(data.GetCellData()->GetArray("backward_end")->GetTuple1(2), -1);
-  EXPECT_EQ(data.GetCell(1)->GetPointId(2), 4);
+  EXPECT_EQ(names->GetValue(static_cast<vtkIdType>(lines.GetArray("end")->GetTuple1(2))), "obstacle");
+  EXPECT_EQ(lines.GetArray("backward_end")->GetTuple1(2), -1);
+  EXPECT_EQ(data->GetCell(1)->GetPointId(2), 4);
   const PathPoint& point = paths[2].points[2];  // The last point of the second polyline: point 4 of the file.
   const auto section = cross_sections(paths[2].points, {1, 1e-300, 1e300})[2];
   const auto expect = [&](const char* name, int component, double value, double tolerance) {
     ASSERT_TRUE(points.HasArray(name)) << name;
     EXPECT_NEAR(points.GetArray(name)->GetComponent(4, component), value, tolerance) << name;
   };
-  EXPECT_EQ(data.GetPoint(4)[0], point.position.x());
+  EXPECT_EQ(data->GetPoint(4)[0], point.position.x());
   expect("tensor", 1, point.tensor(0, 1), 0);
   expect("force", 0, point.force().x(), 2e-6);
   expect("axis_major", 2, section.major.z(), 2e-6);
@@ -204,16 +189,13 @@ TEST(VtpPathsTest, VtkReadsThem) {
 
 TEST(VtpPoints, HoldEveryPointAndAttribute) {
   const PointCloud cloud = cloud_of(3000, 0);
-  const TemporaryFolder folder;
-  const std::filesystem::path path = folder / "a.vtp";
-  write_points(path, cloud);
-  vtkNew<vtkXMLPolyDataReader> reader;
-  reader->SetFileName(path.c_str());
-  reader->Update();
-  vtkPolyData* read = reader->GetOutput();
+  const Temporary file("a.vtp");
+  write_points(file, cloud);
+  const auto read = read_by_vtk(file);
+  vtkPointData& data = *read->GetPointData();
   ASSERT_EQ(read->GetNumberOfPoints(), 3000);
   ASSERT_EQ(read->GetNumberOfVerts(), 3000);
-  EXPECT_STREQ(read->GetPointData()->GetScalars()->GetName(), "wavelength");  // What ParaView shows at first.
+  EXPECT_STREQ(data.GetScalars()->GetName(), "wavelength");  // What ParaView shows at first.
   vtkIdType size = 0;
   const vtkIdType* points = nullptr;
   read->GetVerts()->GetCellAtId(1234, size, points);
@@ -222,10 +204,8 @@ TEST(VtpPoints, HoldEveryPointAndAttribute) {
   std::vector<Record> records;
   const auto vector = [](const double* v) { return Eigen::Vector3d(v[0], v[1], v[2]).cast<float>().eval(); };
   for (vtkIdType i = 0; i < 3000; ++i)
-    records.emplace_back(static_cast<float>(read->GetPointData()->GetArray("power")->GetTuple1(i)),
-                         vector(read->GetPoint(i)),
-                         static_cast<float>(read->GetPointData()->GetArray("wavelength")->GetTuple1(i)),
-                         vector(read->GetPointData()->GetArray("direction")->GetTuple3(i)));
+    records.emplace_back(data.GetArray("power")->GetTuple1(i), vector(read->GetPoint(i)),
+                         data.GetArray("wavelength")->GetTuple1(i), vector(data.GetArray("direction")->GetTuple3(i)));
   expect_records(records, cloud, 0);
   for (const auto& [key, value] : cloud.metadata) {
     auto* text = vtkStringArray::SafeDownCast(read->GetFieldData()->GetAbstractArray(key.c_str()));
@@ -243,9 +223,8 @@ vtkSmartPointer<vtkDataArray> counting(const char* name, int components, vtkIdTy
   array->SetName(name);
   array->SetNumberOfComponents(components);
   array->SetNumberOfTuples(tuples);
-  for (vtkIdType i = 0; i < tuples; ++i) {
-    for (int c = 0; c < components; ++c) array->SetComponent(i, c, 100.0 * static_cast<double>(i) + c);
-  }
+  for (int i = 0; i < tuples; ++i)
+    for (int c = 0; c < components; ++c) array->SetComponent(i, c, 100 * i + c);
   return array;
 }
 
@@ -282,11 +261,8 @@ TEST(ImageLatticeTest, ValuesAreWhereVtkHasThem) {
     EXPECT_EQ(lattice.array, "stress");
     EXPECT_EQ(lattice.frame, Eigen::Matrix3d::Identity());
     for (int i = 0; i < count; ++i) {
-      Eigen::Vector3d expected = Eigen::Vector3d::Zero();
-      if (!of_cells) expected = Eigen::Vector3d(image->GetPoint(i));
-      for (int corner = 0; corner < (of_cells ? 8 : 0); ++corner)
-        expected += Eigen::Vector3d(image->GetCell(i)->GetPoints()->GetPoint(corner)) / 8;
-      const Eigen::Vector3d index(i % size.x(), i / size.x() % size.y(), i / size.x() / size.y());
+      const Vector3d expected = of_cells ? mesh_fixtures::mean_of(*image->GetCell(i)) : Vector3d(image->GetPoint(i));
+      const Vector3d index(i % size.x(), i / size.x() % size.y(), i / size.x() / size.y());
       EXPECT_LT((lattice.to_world * index - expected).norm(), 1e-13);
     }
     const std::vector<double> values = read_all(lattice);
@@ -299,9 +275,10 @@ TEST(ImageLatticeTest, ValuesAreWhereVtkHasThem) {
 TEST(ImageLatticeTest, ImagesThatCannotBe) {
   const auto image = oblique_image();
   const auto array = counting<vtkFloatArray>("stress", 9, image->GetNumberOfPoints() - 1);
-  EXPECT_NE(error_of([&] { lattice_of(image, array, false); }).find("59 values"), std::string::npos);
+  const auto error = [&] { return error_of([&] { lattice_of(image, array, false); }); };
+  EXPECT_THAT(error(), HasSubstr("59 values"));
   image->SetSpacing(1, 0, 1);
-  EXPECT_NE(error_of([&] { lattice_of(image, array, false); }).find("spacing"), std::string::npos);
+  EXPECT_THAT(error(), HasSubstr("spacing"));
 }
 
 }  // namespace
