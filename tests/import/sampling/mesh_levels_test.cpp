@@ -1,12 +1,6 @@
 // Levels of finer voxels, as the cells of a mesh ask.
 
-#include <cmath>
-
-#include <tbb/global_control.h>
-
-#include "tests/import/mesh_fixtures.h"
-#include "tools/import/meshes/mesh_tensors.h"
-#include "tools/import/sampling/mesh_sampling.h"
+#include "tests/import/sampling/sampled.h"
 
 namespace tensorray {
 namespace {
@@ -34,33 +28,6 @@ Grid mesh_of(int type, int n, const Map& map, const Profile& profile) {
   return mesh;
 }
 
-SamplingSettings voxels_of(double size, std::optional<int> levels = {}) {
-  SamplingSettings settings;
-  settings.resolution = size;
-  settings.levels = levels;
-  return settings;
-}
-
-struct Sampled {
-  TensorGrid grid;
-  SamplingReport report;
-
-  /// A level as a grid of its own.
-  TensorGrid level(std::size_t number) const {
-    TensorGrid result;
-    result.blocks = number == 0 ? grid.blocks : grid.finer[number - 1];
-    result.to_world = grid.to_world * Eigen::Scaling(std::pow(0.5, number));
-    return result;
-  }
-};
-
-Sampled sampled_with_levels(vtkDataSet& mesh, const SamplingSettings& settings) {
-  Sampled result;
-  result.grid = sample_mesh(mesh, settings, Progress(), result.report);
-  EXPECT_EQ(result.grid.finer.size(), result.report.finer.size());
-  return result;
-}
-
 /// What voxels of a level differ from a profile by at most, and the farthest of their centres along x.
 std::pair<double, double> worst_and_farthest(const TensorGrid& grid, const Profile& profile) {
   double worst = 0, farthest = 0;
@@ -76,15 +43,15 @@ TEST(MeshLevels, ALayerAtAWallHasFinerVoxelsInCellsOfEveryFamily) {
     SCOPED_TRACE(type);
     const auto column = [](const Vector3d& p) { return Vector3d(graded(p).cwiseProduct(Vector3d(1, 0.5, 0.5))); };
     const Grid mesh = mesh_of(type, 12, column, thin_layer);
-    const Sampled one = sampled_with_levels(*mesh, voxels_of(1.0 / 16, 1));
-    SamplingSettings exact = voxels_of(1.0 / 16);
+    SamplingSettings single = resolution(1.0 / 16), exact = single;
+    single.levels = 1;
     exact.error = 0.002;
-    const Sampled all = sampled_with_levels(*mesh, exact);
+    const Sampled one = sampled(*mesh, single), all = sampled(*mesh, exact);
     EXPECT_TRUE(one.grid.finer.empty());
     ASSERT_GE(all.grid.finer.size(), 2u);
     for (std::size_t level = 1; level <= all.grid.finer.size(); ++level) {
       EXPECT_NEAR(all.report.finer[level - 1].voxel, 1.0 / 16 / std::pow(2, level), 1e-9);
-      const auto [worst, farthest] = worst_and_farthest(all.level(level), thin_layer);
+      const auto [worst, farthest] = worst_and_farthest(level_of(all.grid, level), thin_layer);
       if (level > 1) {
         EXPECT_LT(farthest, 0.5) << level;  // Where cells are larger than 1/32, or the layer has ended.
       }
@@ -102,22 +69,22 @@ TEST(MeshLevels, LinearFieldsEvenCellsAndLargeCellsHaveOneLevel) {
     SCOPED_TRACE(type);
     const Grid linear = unit_cube(type, 12, graded);
     add_array<9>(*linear, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
-    EXPECT_TRUE(sampled_with_levels(*linear, voxels_of(0.08)).grid.finer.empty());
+    EXPECT_TRUE(sampled(*linear, resolution(0.08)).grid.finer.empty());
     const Grid even = mesh_of(type, 12, unchanged, thin_layer);
     if (type == VTK_PYRAMID || type == VTK_TETRA || type == VTK_QUADRATIC_TETRA) continue;  // Thinner than cubes.
     for (const double voxel : {1.0 / 12, 0.03})
-      EXPECT_TRUE(sampled_with_levels(*even, voxels_of(voxel)).grid.finer.empty()) << voxel;
+      EXPECT_TRUE(sampled(*even, resolution(voxel)).grid.finer.empty()) << voxel;
   }
 }
 
 TEST(MeshLevels, AFineSpotIsRefinedWhereItIs) {
   for (const int type : {VTK_HEXAHEDRON, VTK_TETRA}) {
     const Grid mesh = mesh_of(type, 24, towards_centre, fine_spot);
-    const Sampled result = sampled_with_levels(*mesh, voxels_of(0.06));
-    ASSERT_GE(result.grid.finer.size(), 1u);
-    EXPECT_GT(result.report.sampled_peak, 0.97 * result.report.native_peak);
-    for (std::size_t level = 2; level <= result.grid.finer.size(); ++level)  // In bricks of 8³ cells of the one before.
-      for_each_voxel(result.level(level), [&](const Vector3d& p, const Matrix3d&) {
+    const auto [grid, report] = sampled(*mesh, resolution(0.06));
+    ASSERT_GE(grid.finer.size(), 1u);
+    EXPECT_GT(report.sampled_peak, 0.97 * report.native_peak);
+    for (std::size_t level = 2; level <= grid.finer.size(); ++level)  // In bricks of 8³ cells of the one before.
+      for_each_voxel(level_of(grid, level), [&](const Vector3d& p, const Matrix3d&) {
         EXPECT_LT((p - Vector3d::Constant(0.5)).lpNorm<Eigen::Infinity>(), 0.36);
       });
   }
@@ -131,10 +98,10 @@ TEST(MeshLevels, TensorsOfCellsAndTheWantedErrorCount) {
   });
   std::size_t before = 0;
   for (const double error : {0.9, 0.1, 0.01, 0.0}) {
-    SamplingSettings settings = voxels_of(1.0 / 16);
+    SamplingSettings settings = resolution(1.0 / 16);
     settings.error = error;
     std::size_t voxels = 0;
-    for (const LevelReport& level : sampled_with_levels(*mesh, settings).report.finer) voxels += level.active;
+    for (const LevelReport& level : sampled(*mesh, settings).report.finer) voxels += level.active;
     EXPECT_GE(voxels, before) << error;
     EXPECT_EQ(voxels > 0, error < 0.05) << error;
     before = voxels;
@@ -143,32 +110,33 @@ TEST(MeshLevels, TensorsOfCellsAndTheWantedErrorCount) {
 
 TEST(MeshLevels, TheCoarsestAndTheFinestAreChosenOrGiven) {
   const Grid mesh = mesh_of(VTK_HEXAHEDRON, 16, graded, thin_layer);
-  const SamplingReport chosen = sampled_with_levels(*mesh, {}).report;
+  const auto chosen_voxel = [&](const SamplingSettings& settings = {}) {
+    return sampled(*mesh, settings).report.voxel.x();
+  };
   SamplingSettings single;
   single.levels = 1;
-  EXPECT_GE(chosen.voxel.x(), sampled_with_levels(*mesh, single).report.voxel.x());  // Half of the volume's cells.
-  SamplingSettings finest = voxels_of(1.0 / 16);
+  EXPECT_GE(chosen_voxel(), chosen_voxel(single));  // Half of the volume's cells.
+  SamplingSettings finest = resolution(1.0 / 16);
   finest.finest = 1.0 / 32;
-  const Sampled two = sampled_with_levels(*mesh, finest);
-  EXPECT_EQ(two.grid.finer.size(), 1u);
+  EXPECT_EQ(sampled(*mesh, finest).grid.finer.size(), 1u);
   finest.resolution = {};
-  const SamplingReport counted = sampled_with_levels(*mesh, finest).report;
-  EXPECT_NEAR(std::log2(counted.voxel.x() * 32), std::round(std::log2(counted.voxel.x() * 32)), 1e-9);
+  const double halvings = std::log2(chosen_voxel(finest) * 32);
+  EXPECT_NEAR(halvings, std::round(halvings), 1e-9);
   const Grid even = mesh_of(VTK_HEXAHEDRON, 16, unchanged, thin_layer);
-  EXPECT_NEAR(sampled_with_levels(*even, {}).report.voxel.x(), 1.0 / 16, 1e-9);
+  EXPECT_NEAR(sampled(*even).report.voxel.x(), 1.0 / 16, 1e-9);
 }
 
 TEST(MeshLevels, RoundingIsOfTheMedianAndDoublesWithEachLevel) {
   const Grid mesh = mesh_of(VTK_HEXAHEDRON, 16, graded, thin_layer);
-  const Sampled exact = sampled_with_levels(*mesh, voxels_of(1.0 / 16));
-  SamplingSettings settings = voxels_of(1.0 / 16);
+  SamplingSettings settings = resolution(1.0 / 16);
+  const Sampled exact = sampled(*mesh, settings);
   settings.rounding = 0.1;
-  const Sampled rounded = sampled_with_levels(*mesh, settings);
+  const Sampled rounded = sampled(*mesh, settings);
   ASSERT_FALSE(rounded.grid.finer.empty());
   const auto quantum =
       static_cast<float>(std::exp2(std::floor(std::log2(settings.rounding * exact.report.native_median))));
   for (std::size_t level = 0; level <= rounded.grid.finer.size(); ++level) {
-    const TensorGrid before = exact.level(level), after = rounded.level(level);
+    const TensorGrid before = level_of(exact.grid, level), after = level_of(rounded.grid, level);
     ASSERT_EQ(before.blocks.size(), after.blocks.size());
     const float step = std::ldexp(quantum, static_cast<int>(level));
     for (std::size_t i = 0; i < after.blocks.size(); ++i)
@@ -182,15 +150,8 @@ TEST(MeshLevels, RoundingIsOfTheMedianAndDoublesWithEachLevel) {
 
 TEST(MeshLevels, AreTheSameOnAnyNumberOfThreads) {
   const Grid mesh = mesh_of(VTK_TETRA, 10, graded, thin_layer);
-  std::vector<Sampled> results;
-  for (const std::size_t threads : {1u, 3u}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    results.push_back(sampled_with_levels(*mesh, voxels_of(0.1)));
-  }
-  ASSERT_FALSE(results[0].grid.finer.empty());
-  ASSERT_EQ(results[0].grid.finer.size(), results[1].grid.finer.size());
-  for (std::size_t level = 0; level <= results[0].grid.finer.size(); ++level)
-    expect_same_blocks(results[0].level(level), results[1].level(level));
+  ASSERT_FALSE(sampled(*mesh, resolution(0.1)).grid.finer.empty());
+  expect_same_on_threads(*mesh, resolution(0.1));
 }
 
 }  // namespace

@@ -1,16 +1,14 @@
-
-#include <vtkCellData.h>
-#include <vtkPointData.h>
+#include <fmt/format.h>
 #include <vtkUnsignedCharArray.h>
 
 #include "tests/import/imported.h"
-#include "tests/import/mesh_files.h"
+#include "tests/import/sampling/sampled.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
 namespace {
 
+using mesh_fixtures::for_each_voxel;
 using Set = vtkSmartPointer<vtkDataSet>;
 
 std::string collection(const std::string& type, const std::string& contents) {
@@ -18,7 +16,6 @@ std::string collection(const std::string& type, const std::string& contents) {
          "</" + type + ">\n</VTKFile>\n";
 }
 
-std::string blocks(const std::string& contents) { return collection("vtkMultiBlockDataSet", contents); }
 std::string series(const std::string& contents) { return collection("Collection", contents); }
 
 TEST(VtkCollection, BlocksAtAnyDepthAreOneMeshWithoutSurfaces) {
@@ -26,10 +23,10 @@ TEST(VtkCollection, BlocksAtAnyDepthAreOneMeshWithoutSurfaces) {
   std::filesystem::create_directory(folder / "parts & more");
   write_xml(*bar(0, 3), folder / "parts & more" / "0.vtu");
   write_xml(*bar(3, 2), folder / "1.vtu");
-  write_bytes(folder / "all.vtm",
-              blocks("<DataSet index=\"0\" file=\"parts &amp; more/0.vtu\"/>\n<Block index=\"1\"><Block index=\"0\">"
-                     "<DataSet index=\"0\" file=\"1.vtu\"/><DataSet index=\"1\" file=\"wall.vtp\"/></Block></Block>\n"
-                     "<DataSet index=\"2\"/>\n"));
+  write_bytes(folder / "all.vtm", collection("vtkMultiBlockDataSet", R"(
+    <DataSet index="0" file="parts &amp; more/0.vtu"/>
+    <Block index="1"><Block index="0"><DataSet index="0" file="1.vtu"/><DataSet index="1" file="wall.vtp"/></Block>
+    </Block><DataSet index="2"/>)"));
   const auto read = read_vtk_source(folder / "all.vtm");
   EXPECT_EQ(read->GetNumberOfCells(), 5);
   EXPECT_EQ(read->GetNumberOfPoints(), 24);  // The points of the seam are merged.
@@ -53,17 +50,17 @@ TEST(VtkCollection, OfATimeSeriesTheLastTimeWithAllItsParts) {
   write_xml(*bar(0, 3), folder / "late0.vtu");
   write_xml(*bar(3, 2), folder / "late1.vtu");
   write_bytes(folder / "late.vtm", blocks_of({"late0.vtu", "late1.vtu"}));
-  write_bytes(folder / "parts.pvd", series("<DataSet timestep=\"1e1\" part=\"0\" file=\"late0.vtu\"/>\n"
-                                           "<DataSet timestep=\"9\" part=\"0\" file=\"early.vtu\"/>\n"
-                                           "<DataSet timestep=\"10\" part=\"1\" file=\"late1.vtu\"/>\n"));
-  EXPECT_EQ(read_vtk_source(folder / "parts.pvd")->GetNumberOfCells(), 5);
-  EXPECT_EQ(time_steps(folder / "parts.pvd"), 2);
-  EXPECT_EQ(read_vtk_source(folder / "parts.pvd", 0)->GetNumberOfCells(), 1);
-  EXPECT_EQ(read_vtk_source(folder / "parts.pvd", 1)->GetNumberOfCells(), 5);
-  EXPECT_THROW(read_vtk_source(folder / "parts.pvd", 2), std::invalid_argument);
-  write_bytes(folder / "blocks.pvd", series("<DataSet timestep=\"-2\" file=\"early.vtu\"/>\n"
-                                            "<DataSet timestep=\"-1\" file=\"late.vtm\"/>\n"));
-  EXPECT_EQ(read_vtk_source(folder / "blocks.pvd")->GetNumberOfCells(), 5);
+  write_bytes(folder / "parts.pvd", series(R"(<DataSet timestep="1e1" part="0" file="late0.vtu"/>
+                                              <DataSet timestep="9" part="0" file="early.vtu"/>
+                                              <DataSet timestep="10" part="1" file="late1.vtu"/>)"));
+  write_bytes(folder / "blocks.pvd", series(R"(<DataSet timestep="-2" file="early.vtu"/>
+                                               <DataSet timestep="-1" file="late.vtm"/>)"));
+  for (const char* name : {"parts.pvd", "blocks.pvd"}) {
+    EXPECT_EQ(time_steps(folder / name), 2);
+    for (const auto& [step, cells] : {std::pair(std::optional<int>(), 5), {0, 1}, {1, 5}})
+      EXPECT_EQ(read_vtk_source(folder / name, step)->GetNumberOfCells(), cells) << name;
+    EXPECT_THROW(read_vtk_source(folder / name, 2), std::invalid_argument) << name;
+  }
 }
 
 TEST(VtkCollection, APartThatIsNamedTwiceForOneTimeCountsOnceOrIsRefused) {
@@ -92,20 +89,19 @@ TEST(VtkCollection, OfASeriesOfFilesEachIsAStep) {
     return "{\n  \"file-series-version\" : \"1.0\",\n  \"files\" : [" + files + "]\n}\n";
   };
   for (int i = 1; i <= 3; ++i) write_xml(*bar(0, i), folder / (std::to_string(i) + ".vtu"));
-  write_bytes(folder / "a.vtu.series",
-              file_series("{\"name\": \"3.vtu\", \"time\": 1.5}, {\"name\": \"1.vtu\", \"time\": "
-                          "-1}, {\"name\": \"./2.vtu\", \"time\": 1}"));
-  EXPECT_EQ(time_steps(folder / "a.vtu.series"), 3);
-  for (const int step : {0, 1, 2})
-    EXPECT_EQ(read_vtk_source(folder / "a.vtu.series", step)->GetNumberOfCells(), step + 1);
-  EXPECT_EQ(read_vtk_source(folder / "a.vtu.series")->GetNumberOfCells(), 3);
+  const std::filesystem::path file = folder / "a.vtu.series";
+  write_bytes(file, file_series(R"({"name": "3.vtu", "time": 1.5}, {"name": "1.vtu", "time": -1},
+                                   {"name": "./2.vtu", "time": 1})"));
+  EXPECT_EQ(time_steps(file), 3);
+  for (const int step : {0, 1, 2}) EXPECT_EQ(read_vtk_source(file, step)->GetNumberOfCells(), step + 1);
+  EXPECT_EQ(read_vtk_source(file)->GetNumberOfCells(), 3);
   for (const auto& [text, error] : {std::pair(file_series(""), "names no files"),
-                                    {file_series("{\"time\": 1}"), "names no files"},
-                                    {file_series("{\"name\": \"4.vtu\"}"), "4.vtu: does not exist"},
-                                    {file_series("{\"name\": \"a.vtu.series\"}"), "names the collection"},
+                                    {file_series(R"({"time": 1})"), "names no files"},
+                                    {file_series(R"({"name": "4.vtu"})"), "4.vtu: does not exist"},
+                                    {file_series(R"({"name": "a.vtu.series"})"), "names the collection"},
                                     {std::string("[1, 2"), "is not a series of files"}}) {
-    write_bytes(folder / "a.vtu.series", text);
-    EXPECT_THAT(read_error(folder / "a.vtu.series"), HasSubstr(error));
+    write_bytes(file, text);
+    EXPECT_THAT(read_error(file), HasSubstr(error));
   }
 }
 
@@ -163,9 +159,10 @@ TEST(OverlappingBlocks, TheFinerCellCountsInAnyOrder) {
         for (const double voxel : {0.3, 0.5, 1.0}) {  // Of 1, values are averages over thinner cells.
           write_bytes(folder / "both.vtm", blocks_of({first + ending, second + ending}));
           const Imported both = imported(folder / "both.vtm", array_settings("T", Take::tensor, voxel));
+          const AlignedBox3d fine_box(Vector3d::Constant(1 - 1e-5), Vector3d::Constant(3 + 1e-5));
           std::size_t inside = 0;
-          mesh_fixtures::for_each_voxel(both.grid, [&](const Vector3d& x, const Matrix3d& tensor) {
-            const bool is_fine = (x.array() > 1 - 1e-5).all() && (x.array() < 3 + 1e-5).all();
+          for_each_voxel(both.grid, [&](const Vector3d& x, const Matrix3d& tensor) {
+            const bool is_fine = fine_box.contains(x);
             inside += is_fine;
             EXPECT_LT((tensor - (is_fine ? 2 : 1) * Matrix3d::Identity()).norm(), 1e-5)
                 << ending << of_cells << first << voxel << " " << x.transpose();
@@ -213,47 +210,36 @@ TEST(OverlappingBlocks, CopiesNeverCountWhereTheirOriginIs) {
   }
 }
 
-/// Blocks as adaptive codes write them: each halves the cells of the one before within a part of it.
-std::string amr(const std::string& form, int levels) {
-  std::string text, name = form == ".vth" ? "vtkOverlappingAMR" : "vtkMultiBlockDataSet";
-  for (int level = 0; level < levels; ++level) {
-    const std::string number = std::to_string(level);
-    text += "<Block level=\"" + number + "\" index=\"" + number +
-            "\"><DataSet index=\"0\" amr_box=\"0 7 0 7 0 7\" file=\"levels/" + number + ".vti\"/></Block>\n";
-  }
-  return "<VTKFile type=\"" + name + "\" version=\"1.1\"><" + name + ">" + text + "</" + name + "></VTKFile>\n";
-}
-
 TEST(OverlappingBlocks, LevelsOfAdaptiveRefinementArriveAsLevels) {
   const TemporaryFolder folder;
+  // Blocks as adaptive codes write them: each halves the cells of the one before within a part of it.
   std::filesystem::create_directory(folder / "levels");
   const double begins[] = {0, 8, 12}, edges[] = {1, 0.5, 0.25};
+  std::string blocks[3];
   for (int level = 0; level < 3; ++level) {
     const Set block = cube(".vti", begins[level], edges[level], level == 0 ? 32 : 16);
     add_values(*block, true, level + 1);
-    write_xml(*block, folder / "levels" / (std::to_string(level) + ".vti"));
+    write_xml(*block, folder / fmt::format("levels/{}.vti", level));
+    blocks[level] = fmt::format(
+        R"(<Block level="{0}" index="{0}"><DataSet index="0" amr_box="0 7 0 7 0 7" file="levels/{0}.vti"/></Block>)",
+        level);
   }
-  for (const std::string form : {".vth", ".vtm"})
+  const auto box_of = [&](int level, double margin) {
+    return AlignedBox3d(Vector3d::Constant(begins[level] - margin),
+                        Vector3d::Constant(begins[level] + 16 * edges[level] + margin));
+  };
+  for (const auto& [name, type] : {std::pair("all.vth", "vtkOverlappingAMR"), {"all.vtm", "vtkMultiBlockDataSet"}})
     for (const int levels : {2, 3}) {
-      SCOPED_TRACE(form + std::to_string(levels));
-      write_bytes(folder / ("all" + form), amr(form, levels));
-      const auto [grid, report] = imported(folder / ("all" + form));
+      SCOPED_TRACE(name + std::to_string(levels));
+      write_bytes(folder / name, collection(type, blocks[0] + blocks[1] + (levels == 3 ? blocks[2] : "")));
+      const auto [grid, report] = imported(folder / name);
       EXPECT_NEAR(report.mesh->voxel.x(), 1, 1e-9);
       ASSERT_EQ(grid.finer.size(), static_cast<std::size_t>(levels - 1));
       for (int level = 1; level < levels; ++level) {
-        TensorGrid one;
-        one.blocks = grid.finer[static_cast<std::size_t>(level - 1)];
-        one.to_world = grid.to_world * Eigen::Scaling(std::pow(0.5, level));
-        const Eigen::AlignedBox3d block(Vector3d::Constant(begins[level]),
-                                        Vector3d::Constant(begins[level] + 16 * edges[level]));
+        const AlignedBox3d finer = level + 1 == levels ? AlignedBox3d() : box_of(level + 1, 0.6 * edges[level]);
         std::size_t inside = 0;
-        mesh_fixtures::for_each_voxel(one, [&](const Vector3d& x, const Matrix3d& tensor) {
-          const bool is_last =
-              level + 1 == levels ||
-              !Eigen::AlignedBox3d(Vector3d::Constant(begins[level + 1] - 0.6 * edges[level]),
-                                   Vector3d::Constant(begins[level + 1] + 16 * edges[level + 1] + 0.6 * edges[level]))
-                   .contains(x);
-          if (!block.contains(x) || !is_last) return;
+        for_each_voxel(mesh_fixtures::level_of(grid, level), [&](const Vector3d& x, const Matrix3d& tensor) {
+          if (!box_of(level, 0).contains(x) || finer.contains(x)) return;
           ++inside;
           EXPECT_LT((tensor - (level + 1) * Matrix3d::Identity()).norm(), 1e-5) << x.transpose();
         });

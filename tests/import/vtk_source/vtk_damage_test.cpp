@@ -1,11 +1,7 @@
 // Files that VTK would read wrongly, or that would crash it, are errors before or after VTK reads them. All are read in
 // child processes: no file ends the other tests.
 
-#include <utility>
-
-#include "tests/import/mesh_files.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
 namespace {

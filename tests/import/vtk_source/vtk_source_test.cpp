@@ -1,15 +1,8 @@
 #include "tools/import/vtk_source/vtk_source.h"
 
 #include <array>
-#include <cstring>
 
-#include <vtkAppendFilter.h>
-#include <vtkCellData.h>
-#include <vtkDataArray.h>
-#include <vtkDataSet.h>
 #include <vtkLongLongArray.h>
-#include <vtkPointData.h>
-#include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtk_cgns.h>
 // clang-format off
@@ -17,12 +10,10 @@
 // clang-format on
 
 #include "tests/import/hdf5_writer.h"
-#include "tests/import/mesh_files.h"
 #include "tests/import/openfoam_case.h"
 #include "tests/import/velocity_meshes.h"
 #include "tests/import/vtk_files.h"
 #include "tools/import/meshes/mesh_tensors.h"
-#include "tools/import/vtk_formats/image_lattice.h"
 
 namespace tensorray {
 namespace {
@@ -35,19 +26,17 @@ TEST(VtkSourceTest, FilesOfEveryEncoding) {
   constexpr double exact = 0x1p-1000;
   for (const auto& [ending, written] : data_sets()) {
     SCOPED_TRACE(ending);
-    const auto expect_read = [&, &set = *written](const std::filesystem::path& path, double tolerance) {
-      const auto read = read_vtk_source(path);
-      EXPECT_TRUE(read->IsA(set.GetClassName())) << read->GetClassName();
-      expect_same(*read, set, tolerance);
-      return std::string(read->GetClassName());
-    };
     for (const Mode mode : {Mode::ascii, Mode::binary, Mode::raw_compressed, Mode::raw_plain}) {
       write_xml(*written, folder / ("file" + ending), mode);
-      EXPECT_EQ(expect_read(folder / ("file" + ending), mode == Mode::ascii ? 1e-9 : exact), written->GetClassName());
+      const auto read = read_vtk_source(folder / ("file" + ending));
+      EXPECT_STREQ(read->GetClassName(), written->GetClassName());
+      expect_same(*read, *written, mode == Mode::ascii ? 1e-9 : exact);
     }
     for (const bool binary : {false, true}) {
       write_legacy(*written, folder / "file.vtk", binary);
-      expect_read(folder / "file.vtk", binary ? exact : 1e-5);  // VTK writes ASCII with six or more digits
+      const auto read = read_vtk_source(folder / "file.vtk");
+      EXPECT_TRUE(read->IsA(written->GetClassName())) << read->GetClassName();
+      expect_same(*read, *written, binary ? exact : 1e-5);  // VTK writes ASCII with six or more digits
     }
   }
 }
@@ -68,9 +57,8 @@ TEST(VtkSourceTest, UnstructuredPiecesAreMergedAndGhostCellsRemoved) {
   EXPECT_EQ(read->GetNumberOfCells(), 5);
   EXPECT_EQ(read->GetNumberOfPoints(), 24);
   EXPECT_FALSE(read->HasAnyGhostPoints());
-  for (vtkIdType i = 0; i < read->GetNumberOfPoints(); ++i) {
+  for (vtkIdType i = 0; i < read->GetNumberOfPoints(); ++i)
     EXPECT_EQ(read->GetPointData()->GetArray("tensor")->GetComponent(i, 4), number(read->GetPoint(i), 4));
-  }
 
   std::filesystem::remove(folder / "p1.vtu");
   EXPECT_THAT(read_error(folder / "all.pvtu"), HasSubstr("p1.vtu is missing"));
@@ -98,33 +86,26 @@ TEST(VtkSourceTest, OpenFoamCase) {
   const TemporaryFolder folder;
   OpenFoamCase::write(folder);
   write_bytes(folder / "case.foam", "");
-  for (const std::filesystem::path& path :
-       {std::filesystem::path(folder), folder / "case.foam", folder / "system" / "controlDict"}) {
+  // Of the first values, the components in this order of those of the file.
+  const auto expect_order = [](vtkDataArray& array, int count, const Ints& order) {
+    for (int i = 0; i < count; ++i)
+      for (std::size_t c = 0; c < order.size(); ++c)
+        EXPECT_EQ(array.GetComponent(i, static_cast<int>(c)), OpenFoamCase::value(i, order[c], 1)) << c;
+  };
+  for (const std::filesystem::path& path : {folder.path(), folder / "case.foam", folder / "system" / "controlDict"}) {
     const auto read = read_vtk_source(path);
     ASSERT_EQ(read->GetNumberOfCells(), OpenFoamCase::cells);
     ASSERT_EQ(read->GetNumberOfPoints(), 27);
-    EXPECT_TRUE(Eigen::Vector3d(read->GetPoint(26)).isApprox(Eigen::Vector3d(2, 1, 4)));
-    const int symmetric[6] = {0, 3, 5, 1, 4, 2};  // VTK's xx yy zz xy yz xz among OpenFOAM's xx xy xz yy yz zz.
+    EXPECT_TRUE(Vector3d(read->GetPoint(26)).isApprox(Vector3d(2, 1, 4)));
     vtkCellData& data = *read->GetCellData();
-    for (int cell = 0; cell < OpenFoamCase::cells; ++cell)
-      for (int c = 0; c < 9; ++c) {
-        EXPECT_EQ(data.GetArray("gradU")->GetComponent(cell, c), OpenFoamCase::value(cell, c, 1));
-        if (c < 6) {
-          EXPECT_EQ(data.GetArray("sigma")->GetComponent(cell, c), OpenFoamCase::value(cell, symmetric[c], 1));
-        }
-        if (c < 3) {
-          EXPECT_EQ(data.GetArray("U")->GetComponent(cell, c), OpenFoamCase::value(cell, c, 1));
-        }
-      }
+    expect_order(*data.GetArray("U"), OpenFoamCase::cells, {0, 1, 2});
+    expect_order(*data.GetArray("gradU"), OpenFoamCase::cells, {0, 1, 2, 3, 4, 5, 6, 7, 8});
+    // VTK's xx yy zz xy yz xz among OpenFOAM's xx xy xz yy yz zz.
+    expect_order(*data.GetArray("sigma"), OpenFoamCase::cells, {0, 3, 5, 1, 4, 2});
     // The components' names tell the order. The order of OpenFOAM's own files is refused.
     const ArrayChoice sigma{"sigma", true};
     const auto tensors = with_tensors(*read, sigma, Take::tensor, {});
-    const double* const corner =
-        vtkDoubleArray::SafeDownCast(tensors->GetPointData()->GetArray("tensor"))->GetPointer(0);
-    for (int c = 0; c < 9; ++c) {
-      const int expected[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
-      EXPECT_EQ(corner[c], OpenFoamCase::value(0, expected[c], 1)) << c;
-    }
+    expect_order(*tensors->GetPointData()->GetArray("tensor"), 1, {0, 1, 2, 1, 3, 4, 2, 4, 5});
     EXPECT_THROW(with_tensors(*read, sigma, Take::tensor, TensorOrder::fsl), std::invalid_argument);
     // Points have the mean of their cells; the middle point has the mean of all cells.
     const auto gradients = with_tensors(*read, {"gradU", true}, Take::tensor, {});
@@ -149,34 +130,20 @@ TEST(VtkSourceTest, IncompleteOpenFoamCases) {
 }
 
 // Polyhedra as VTK 9.4 writes them: in four arrays of faces.
-/// The faces of a cube with the corners of `bar`, which are those of cube i from 4 i on.
-const std::vector<Ints> cube_faces{{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
-
-/// Those of a bar of two cubes, which has the first one as a hexahedron.
-struct Faces {
-  Ints connectivity, offsets, of_cells{0, 1, 2, 3, 4, 5}, cells{0, 6};
-};
-
-Faces faces_of_second() {
-  Faces result;
-  for (const Ints& face : cube_faces) {
-    for (const int corner : face) result.connectivity.push_back(4 + corner);
-    result.offsets.push_back(static_cast<int>(result.connectivity.size()));
-  }
-  return result;
-}
+/// The faces of the second cube of a bar of two, which has the first one as a hexahedron.
+const Ints connectivity{4, 5, 7, 6, 8, 10, 11, 9, 4, 8, 9, 5, 6, 7, 11, 10, 4, 6, 10, 8, 5, 9, 11, 7};
+const Ints offsets{4, 8, 12, 16, 20, 24}, faces_of_cells{0, 1, 2, 3, 4, 5}, offsets_of_cells{0, 6};
 
 /// A hexahedron, and a polyhedron.
 Grid mixed_bar() {
   const Grid bars = bar(0, 2), mixed = Grid::New();
   mixed->SetPoints(bars->GetPoints());
-  vtkNew<vtkIdList> corners, stream;
-  bars->GetCellPoints(0, corners);
-  mixed->InsertNextCell(VTK_HEXAHEDRON, corners);
+  mixed->InsertNextCell(VTK_HEXAHEDRON, bars->GetCell(0)->GetPointIds());
+  vtkNew<vtkIdList> stream;
   stream->InsertNextId(6);
-  for (const Ints& face : cube_faces) {
-    stream->InsertNextId(4);
-    for (const int corner : face) stream->InsertNextId(4 + corner);
+  for (std::size_t i = 0; i < connectivity.size(); ++i) {
+    if (i % 4 == 0) stream->InsertNextId(4);
+    stream->InsertNextId(connectivity[i]);
   }
   mixed->InsertNextCell(VTK_POLYHEDRON, stream);
   return with_arrays(mixed);
@@ -192,16 +159,15 @@ void expect_linear(const std::filesystem::path& path, std::size_t voxels) {
 
 TEST(Polyhedra, OfVtk94AreReadInAllFormsOfItsXml) {
   const TemporaryFolder folder;
-  const Faces faces = faces_of_second();
   for (const Mode mode : {Mode::ascii, Mode::binary, Mode::raw_compressed, Mode::raw_plain}) {
     const Grid grid = mixed_bar();
-    for (const auto& [name, values] : {std::pair("face_connectivity", &faces.connectivity),
-                                       {"face_offsets", &faces.offsets},
-                                       {"polyhedron_to_faces", &faces.of_cells},
-                                       {"polyhedron_offsets", &faces.cells}}) {
+    for (const auto& [name, values] : {std::pair("face_connectivity", connectivity),
+                                       {"face_offsets", offsets},
+                                       {"polyhedron_to_faces", faces_of_cells},
+                                       {"polyhedron_offsets", offsets_of_cells}}) {
       vtkNew<vtkLongLongArray> array;
       array->SetName(name);
-      for (const int value : *values) array->InsertNextValue(value);
+      for (const int value : values) array->InsertNextValue(value);
       grid->GetFieldData()->AddArray(array);
     }
     write_xml(*grid, folder / "a.vtu", mode);
@@ -223,23 +189,18 @@ TEST(Polyhedra, OfVtk94AreReadInAllFormsOfItsXml) {
     if (mode != Mode::ascii) continue;
     const std::size_t at = text.find('>', text.find("Name=\"polyhedron_to_faces\"")) + 1;
     write_bytes(folder / "a.vtu", text.replace(text.find('5', at), 1, "9"));
-    EXPECT_THAT(read_error(folder / "a.vtu"), testing::HasSubstr("its polyhedra name faces that are not there"));
+    EXPECT_THAT(read_error(folder / "a.vtu"), HasSubstr("its polyhedra name faces that are not there"));
   }
 }
 
 TEST(Polyhedra, OfVtkHdfAreReadOfEachPart) {
   const TemporaryFolder folder;
-  const Faces one = faces_of_second();
   {
     Hdf5Writer file(folder / "a.vtkhdf");
     const auto twice = [&](const std::string& name, const Ints& values) {
       Ints both = values;
       both.insert(both.end(), values.begin(), values.end());
       file.write("/VTKHDF/" + name, {both.size()}, both);
-    };
-    const auto from_zero = [](Ints ends) {
-      ends.insert(ends.begin(), 0);
-      return ends;
     };
     file.begin_vtk("UnstructuredGrid", {2, 5});
     twice("NumberOfPoints", {12});
@@ -251,10 +212,10 @@ TEST(Polyhedra, OfVtkHdfAreReadOfEachPart) {
     twice("Connectivity", {0, 4, 5, 1, 2, 6, 7, 3, 4, 5, 6, 7, 8, 9, 10, 11});
     twice("Offsets", {0, 8, 16});
     twice("Types", {12, 42});
-    twice("FaceConnectivity", one.connectivity);
-    twice("FaceOffsets", from_zero(one.offsets));
-    twice("PolyhedronToFaces", one.of_cells);
-    twice("PolyhedronOffsets", from_zero(one.cells));
+    twice("FaceConnectivity", connectivity);
+    twice("FaceOffsets", {0, 4, 8, 12, 16, 20, 24});
+    twice("PolyhedronToFaces", faces_of_cells);
+    twice("PolyhedronOffsets", {0, 0, 6});
     std::vector<double> points, values;
     for (int i = 0; i < 24; ++i) {
       const double x[] = {double(i / 4 - i / 12), double(i % 2), double(i / 2 % 2)};
@@ -356,10 +317,8 @@ TEST(Cgns, ZonesAreOneMeshInBothFormatsWithValuesAtPointsAndCells) {
     vtkDataArray* const of_cells = read->GetCellData()->GetArray("Velocity");
     ASSERT_TRUE(of_cells && of_cells->GetNumberOfComponents() == 3);
     for (vtkIdType i = 0; i < read->GetNumberOfCells(); ++i)
-      for (int c = 0; c < 3; ++c) {
-        const Eigen::Vector3d centre = mesh_fixtures::middle_of(*read->GetCell(i));
-        EXPECT_EQ(of_cells->GetComponent(i, c), velocity(centre.data(), c, 0));
-      }
+      for (int c = 0; c < 3; ++c)
+        EXPECT_EQ(of_cells->GetComponent(i, c), velocity(mesh_fixtures::middle_of(*read->GetCell(i)).data(), c, 0));
     std::filesystem::remove(folder / "a.cgns");
   }
 }
