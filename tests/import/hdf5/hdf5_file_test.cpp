@@ -194,23 +194,14 @@ void begin_image(Hdf5Writer& file, double version) {
   file.attribute("/VTKHDF", "Spacing", Doubles{0.5, 1, 2});
 }
 
-TEST(VtkHdf, Images) {
+/// Of a file with steps, arrays may be the same at all of them, and others may name their steps.
+TEST(VtkHdf, ImagesWithAndWithoutSteps) {
   const TemporaryFolder folder;
   {
     Hdf5Writer file(folder / "a.hdf");
     begin_image(file, 1);
-    file.write("/VTKHDF/PointData/v", {2, 2, 3, 3}, counting(12 * 3));
+    file.write("/VTKHDF/PointData/still", {2, 2, 3, 3}, counting(12 * 3));
   }
-  const auto image = read_vtk_source(folder / "a.hdf");
-  ASSERT_TRUE(vtkImageData::SafeDownCast(image));
-  EXPECT_EQ(image->GetPoint(11)[0], 2);
-  EXPECT_EQ(image->GetPoint(11)[2], 5);
-  EXPECT_EQ(image->GetPointData()->GetArray("v")->GetComponent(11, 2), 35);
-}
-
-/// A file with steps may have arrays that are the same at all of them, and others that name their steps.
-TEST(VtkHdf, ArraysOfImagesMayStay) {
-  const TemporaryFolder folder;
   {
     Hdf5Writer file(folder / "a.vtkhdf");
     begin_image(file, 2);
@@ -222,14 +213,20 @@ TEST(VtkHdf, ArraysOfImagesMayStay) {
     file.write("/VTKHDF/PointData/still", {2, 2, 3, 3}, counting(12 * 3));
     file.text("/VTKHDF/PointData/label", "water");
   }
+  const auto expect_array = [&](const char* file, int step, const char* name, int first) {
+    const auto image = read_vtk_source(folder / file, step);
+    ASSERT_TRUE(vtkImageData::SafeDownCast(image));
+    EXPECT_EQ(Vector3d(image->GetPoint(11)), Vector3d(2, 3, 5));
+    vtkDataArray* const array = image->GetPointData()->GetArray(name);
+    ASSERT_TRUE(array) << name;
+    EXPECT_EQ(array->GetNumberOfComponents(), 3);
+    EXPECT_EQ(array->GetComponent(11, 2), first + 35) << name << step;
+  };
+  expect_array("a.hdf", 0, "still", 0);
   for (const int step : {0, 1}) {
-    const auto image = read_vtk_source(folder / "a.vtkhdf", step);
-    for (const auto& [name, first] : {std::pair("moving", 36 * step), {"named", 36 - 36 * step}, {"still", 0}}) {
-      vtkDataArray* const array = image->GetPointData()->GetArray(name);
-      ASSERT_TRUE(array) << name;
-      EXPECT_EQ(array->GetNumberOfComponents(), 3);
-      EXPECT_EQ(array->GetComponent(11, 2), first + 35) << name << step;
-    }
+    expect_array("a.vtkhdf", step, "still", 0);
+    expect_array("a.vtkhdf", step, "moving", 36 * step);
+    expect_array("a.vtkhdf", step, "named", 36 - 36 * step);
   }
 }
 
@@ -298,11 +295,6 @@ vtkSmartPointer<vtkDataSet> read(const fs::path& folder, const std::string& text
   return read_vtk_source(folder / "a.xdmf", step);
 }
 
-double first_value(vtkDataSet& mesh, const char* name) {
-  vtkDataArray* const array = mesh.GetPointData()->GetArray(name);
-  return array ? array->GetComponent(0, 0) : NAN;
-}
-
 TEST(Xdmf, AGridInTheFileItself) {
   const TemporaryFolder folder;
   const auto mesh = read(folder, grid_document(mesh_items + attribute("f", 7) + R"(
@@ -333,9 +325,9 @@ TEST(Xdmf, FunctionsOfFenicsxShareTheirMesh) {
   const auto last = read(folder, text), first = read(folder, text, 0);
   EXPECT_EQ(time_steps(folder / "a.xdmf"), 2);
   EXPECT_EQ(last->GetNumberOfCells(), 2);
-  EXPECT_EQ(first_value(*last, "f"), 101);
-  EXPECT_EQ(first_value(*last, "g"), 150);
-  EXPECT_EQ(first_value(*first, "f"), 1);
+  EXPECT_EQ(last->GetPointData()->GetArray("f")->GetComponent(0, 0), 101);
+  EXPECT_EQ(last->GetPointData()->GetArray("g")->GetComponent(0, 0), 150);
+  EXPECT_EQ(first->GetPointData()->GetArray("f")->GetComponent(0, 0), 1);
   EXPECT_THROW(read(folder, text, 2), std::invalid_argument);
 }
 
@@ -424,45 +416,45 @@ TEST(Xdmf, MixedCellsOrderedMeshesAndBinaryFiles) {
 
 TEST(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
   const TemporaryFolder folder;
-  const auto error = [&](const std::string& text) { return error_of([&] { read(folder, text); }); };
-  const auto changed = [&](const std::string& from, const std::string& to) {
-    return error(replaced_text(grid_document(mesh_items), from, to));
+  const auto refuses = [&](const std::string& text, const char* words) {
+    EXPECT_THAT(error_of([&] { read(folder, text); }), HasSubstr(words));
   };
-  const auto with_array = [&](const std::string& item) {
-    return error(grid_document(mesh_items + "<Attribute Name=\"f\">" + item + "</Attribute>"));
+  const auto changed = [](const std::string& from, const std::string& to) {
+    return replaced_text(grid_document(mesh_items), from, to);
   };
-  const auto ordered = [&](const char* type, const char* size, const char* geometry, const Strings& lists) {
+  const auto with_array = [](const std::string& item) {
+    return grid_document(mesh_items + "<Attribute Name=\"f\">" + item + "</Attribute>");
+  };
+  const auto ordered = [](const char* type, const char* size, const char* geometry, const Strings& lists) {
     std::string items;
     for (const std::string& list : lists) items += "<DataItem Format=\"XML\">" + list + "</DataItem>";
-    return error(grid_document(
-        fmt::format(R"(<Topology TopologyType="{}" Dimensions="{}"/><Geometry GeometryType="{}">{}</Geometry>)", type,
-                    size, geometry, items)));
+    const char* const form =
+        R"(<Topology TopologyType="{}" Dimensions="{}"/><Geometry GeometryType="{}">{}</Geometry>)";
+    return grid_document(fmt::format(form, type, size, geometry, items));
   };
-  EXPECT_THAT(error(grid_document(mesh_items).substr(0, 200)), HasSubstr("a.xdmf: is damaged"));
-  EXPECT_THAT(error(document("")), HasSubstr("has no grid"));
-  EXPECT_THAT(changed("1 2 3 4</DataItem>", "1 2 3</DataItem>"), HasSubstr("has 7"));
-  EXPECT_THAT(changed("1 2 3 4</DataItem>", "1 2 3 9</DataItem>"), HasSubstr("point 9"));
-  EXPECT_THAT(changed("Tetrahedron", "Wurtzite"), HasSubstr("type wurtzite"));
-  EXPECT_THAT(changed("0 0 0  1 0 0", "0 0 0  1 0 x"), HasSubstr("no numbers"));
-  EXPECT_THAT(changed("Format=\"XML\">0 0", "Format=\"HDF\">none.h5:/x"), HasSubstr("none.h5: is missing"));
-  EXPECT_THAT(with_array("<DataItem Format=\"XML\">1 2</DataItem>"), HasSubstr("2 numbers for 5 points"));
-  EXPECT_THAT(with_array("<DataItem Reference=\"XML\">/Xdmf/Domain/Grid/Attribute/DataItem</DataItem>"),
-              HasSubstr("refers to itself"));
+  refuses(grid_document(mesh_items).substr(0, 200), "a.xdmf: is damaged");
+  refuses(document(""), "has no grid");
+  refuses(changed("1 2 3 4</DataItem>", "1 2 3</DataItem>"), "has 7");
+  refuses(changed("1 2 3 4</DataItem>", "1 2 3 9</DataItem>"), "point 9");
+  refuses(changed("Tetrahedron", "Wurtzite"), "type wurtzite");
+  refuses(changed("0 0 0  1 0 0", "0 0 0  1 0 x"), "no numbers");
+  refuses(changed("Format=\"XML\">0 0", "Format=\"HDF\">none.h5:/x"), "none.h5: is missing");
   write_bytes(folder / "b.h5", "\x89HDF\r\n\x1a\n and no more");
-  EXPECT_THAT(changed("Format=\"XML\">0 0", "Format=\"HDF\">b.h5:/x"), HasSubstr("b.h5: is no HDF5"));
+  refuses(changed("Format=\"XML\">0 0", "Format=\"HDF\">b.h5:/x"), "b.h5: is no HDF5");
+  refuses(with_array("<DataItem Format=\"XML\">1 2</DataItem>"), "2 numbers for 5 points");
+  refuses(with_array("<DataItem Reference=\"XML\">/Xdmf/Domain/Grid/Attribute/DataItem</DataItem>"),
+          "refers to itself");
   // Numbers whose products are beyond all integers, or that do not fit each other.
-  EXPECT_THAT(with_array(R"(<DataItem ItemType="HyperSlab" Dimensions="5">
+  refuses(with_array(R"(<DataItem ItemType="HyperSlab" Dimensions="5">
       <DataItem Format="XML">0 17592186044416 1048577</DataItem><DataItem Format="XML">1 2 3 4 5</DataItem></DataItem>)"),
-              HasSubstr("a.xdmf: a DataItem is a HyperSlab beyond"));
-  EXPECT_THAT(ordered("3DCoRectMesh", "1000000000 1000000000 1000000000", "Origin_DxDyDz", {"0 0 0", "1 1 1"}),
-              HasSubstr("senseless"));
-  EXPECT_THAT(ordered("3DCoRectMesh", "2 2 2", "VxVyVz", {"5 6", "5 6", "5 6"}),
-              HasSubstr("type vxvyvz, which does not fit"));
-  EXPECT_THAT(ordered("3DRectMesh", "2 2 2", "Origin_DxDyDz", {"5 6 7", "1 1 1"}),
-              HasSubstr("type origin_dxdydz, which does not fit"));
-  EXPECT_THAT(ordered("3DRectMesh", "2 2 3", "VxVyVz", {"5 6", "5 6", "5 6"}),
-              HasSubstr("other numbers of coordinates"));
-  EXPECT_THAT(ordered("3DSMesh", "2 2 2", "XYZ", {"0 0 0  1 0 0"}), HasSubstr("another number of points"));
+          "a.xdmf: a DataItem is a HyperSlab beyond");
+  refuses(ordered("3DCoRectMesh", "1000000000 1000000000 1000000000", "Origin_DxDyDz", {"0 0 0", "1 1 1"}),
+          "senseless");
+  refuses(ordered("3DCoRectMesh", "2 2 2", "VxVyVz", {"5 6", "5 6", "5 6"}), "type vxvyvz, which does not fit");
+  refuses(ordered("3DRectMesh", "2 2 2", "Origin_DxDyDz", {"5 6 7", "1 1 1"}),
+          "type origin_dxdydz, which does not fit");
+  refuses(ordered("3DRectMesh", "2 2 3", "VxVyVz", {"5 6", "5 6", "5 6"}), "other numbers of coordinates");
+  refuses(ordered("3DSMesh", "2 2 2", "XYZ", {"0 0 0  1 0 0"}), "another number of points");
 }
 
 TEST(Xdmf, BlocksThatShareTheirPointsAreNotTheSameMesh) {

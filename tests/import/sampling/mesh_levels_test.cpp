@@ -8,9 +8,6 @@ namespace {
 using namespace mesh_fixtures;
 using Profile = std::function<double(const Vector3d&)>;
 
-constexpr int families[] = {VTK_HEXAHEDRON,      VTK_LAGRANGE_HEXAHEDRON, VTK_WEDGE, VTK_PYRAMID, VTK_TETRA,
-                            VTK_QUADRATIC_TETRA, VTK_QUADRATIC_HEXAHEDRON};
-
 /// Cells become thin towards x = 0: from 0.27 down to 0.0025, if they are 16.
 Vector3d graded(const Vector3d& p) { return {std::expm1(5 * p.x()) / std::expm1(5), p.y(), p.z()}; }
 

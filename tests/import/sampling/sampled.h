@@ -10,6 +10,9 @@
 
 namespace tensorray::mesh_fixtures {
 
+inline constexpr int families[] = {VTK_HEXAHEDRON,      VTK_LAGRANGE_HEXAHEDRON, VTK_WEDGE, VTK_PYRAMID, VTK_TETRA,
+                                   VTK_QUADRATIC_TETRA, VTK_QUADRATIC_HEXAHEDRON};
+
 /// Of a number of voxels along the longest edge or along each, or of their size.
 template <class Resolution>
 SamplingSettings resolution(const Resolution& value) {

@@ -191,9 +191,8 @@ TEST(BodySurface, CellsOfAnySenseLookOutwards) {
   vtkNew<vtkIdList> ids;
   for (vtkIdType cell = 0; cell < 27; cell += 2) {
     box->GetCellPoints(cell, ids);
-    const vtkIdType mirrored[] = {ids->GetId(4), ids->GetId(5), ids->GetId(6), ids->GetId(7),
-                                  ids->GetId(0), ids->GetId(1), ids->GetId(2), ids->GetId(3)};
-    box->GetCells()->ReplaceCellAtId(cell, 8, mirrored);
+    std::rotate(ids->begin(), ids->begin() + 4, ids->end());  // Mirrors it.
+    box->GetCells()->ReplaceCellAtId(cell, ids);
   }
   const BodySurface surface = surface_of(*box, 0.01);
   EXPECT_EQ(surface.open_edges, 0u);

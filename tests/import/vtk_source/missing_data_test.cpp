@@ -10,6 +10,7 @@ namespace tensorray {
 namespace {
 
 using namespace mesh_fixtures;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 ImportSettings half_voxels(const std::string& array, Take take = Take::tensor, CellValues values = CellValues::linear) {
   ImportSettings settings = array_settings(array, take, 0.5);
@@ -24,10 +25,10 @@ vtkDataSetAttributes& data_of(vtkDataSet& set, bool of_cells) {
   return *set.GetAttributes(of_cells ? vtkDataObject::CELL : vtkDataObject::POINT);
 }
 
-bool nowhere(double) { return false; }
-
 /// Adds an array of ones, except for where `missing` tells that there is no number.
-void add_ones(vtkDataSet& mesh, const char* name, int components, bool of_cells, bool (*missing)(double x) = nowhere) {
+void add_ones(
+    vtkDataSet& mesh, const char* name, int components, bool of_cells,
+    bool (*missing)(double x) = [](double) { return false; }) {
   vtkNew<vtkDoubleArray> array;
   array->SetName(name);
   array->SetNumberOfComponents(components);
@@ -97,8 +98,7 @@ std::vector<std::pair<std::string, vtkSmartPointer<vtkDataSet>>> kinds_of_cubes(
   auto image = vtkSmartPointer<vtkImageData>::New();
   image->SetDimensions(5, 3, 3);
   const auto rectilinear = rectilinear_grid({0, 1, 2, 3, 4}, {0, 1, 2}, {0, 1, 2});
-  const auto structured =
-      curvilinear({5, 3, 3}, [](const Vector3d& p) { return Vector3d(4 * p.x(), 2 * p.y(), 2 * p.z()); });
+  const auto structured = curvilinear({5, 3, 3}, [](const Vector3d& p) { return Vector3d(4, 2, 2).cwiseProduct(p); });
   return {{".vti", image}, {".vtr", rectilinear}, {".vts", structured}, {".vtu", cubes()}};
 }
 
@@ -189,14 +189,12 @@ TEST(MissingData, OfPointsOfTwoPiecesTheFiniteValuesAreTakenWhateverTheirType) {
 TEST(MissingData, PiecesMayHaveComponentsInOtherOrders) {
   const TemporaryFolder folder;
   const auto first = cubes(0, 2), second = cubes(2, 4);
-  const auto add = [](vtkDataSet& mesh, const std::vector<const char*>& names, const Eigen::Matrix<double, 6, 1>& v) {
+  const auto add = [](vtkDataSet& mesh, const std::array<const char*, 6>& names, const Vector6d& v) {
     add_array<6>(mesh, "S", [&](const Vector3d&) { return v; });
-    for (int i = 0; i < 6; ++i)
-      mesh.GetPointData()->GetArray("S")->SetComponentName(i, names[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < 6; ++i) mesh.GetPointData()->GetArray("S")->SetComponentName(i, names[i]);
   };
-  add(*first, {"s_xx", "s_xy", "s_xz", "s_yy", "s_yz", "s_zz"},
-      (Eigen::Matrix<double, 6, 1>() << 1, 4, 6, 2, 5, 3).finished());
-  add(*second, {"XX", "YY", "ZZ", "XY", "YZ", "XZ"}, (Eigen::Matrix<double, 6, 1>() << 1, 2, 3, 4, 5, 6).finished());
+  add(*first, {"s_xx", "s_xy", "s_xz", "s_yy", "s_yz", "s_zz"}, (Vector6d() << 1, 4, 6, 2, 5, 3).finished());
+  add(*second, {"XX", "YY", "ZZ", "XY", "YZ", "XZ"}, (Vector6d() << 1, 2, 3, 4, 5, 6).finished());
   const Matrix3d expected = (Matrix3d() << 1, 4, 6, 4, 2, 5, 6, 5, 3).finished();
   const Matrix3d found = imported(write_halves(folder, *first, *second), half_voxels("S")).tensor();
   EXPECT_LT((found - expected).norm(), 1e-5);

@@ -130,10 +130,6 @@ void add_values(vtkDataSet& set, bool of_cells, double value) {
   of_cells ? mesh_fixtures::add_cell_array<9>(set, "T", tensor) : mesh_fixtures::add_array<9>(set, "T", tensor);
 }
 
-void set_value(vtkDataSetAttributes& data, vtkIdType i, double value) {
-  for (const int diagonal : {0, 4, 8}) data.GetArray("T")->SetComponent(i, diagonal, value);
-}
-
 /// A cube of n³ cells: an image, or a structured or unstructured grid.
 Set cube(const std::string& ending, double first, double edge, int n) {
   const auto at = [=](const Vector3d& p) { return Vector3d((Vector3d::Constant(first) + n * edge * p)); };
@@ -180,7 +176,8 @@ void add_stale(vtkUnstructuredGrid& set, bool of_cells) {
   vtkDataSetAttributes& data = *set.GetAttributes(of_cells ? vtkDataObject::CELL : vtkDataObject::POINT);
   for (vtkIdType i = 0; i < count; ++i) {
     marks->InsertNextValue(i < count - stale ? 0 : 1);  // DUPLICATECELL and DUPLICATEPOINT.
-    if (i >= count - stale) set_value(data, i, 7);
+    for (const int diagonal : {0, 4, 8})
+      if (i >= count - stale) data.GetArray("T")->SetComponent(i, diagonal, 7);
   }
   data.AddArray(marks);
 }

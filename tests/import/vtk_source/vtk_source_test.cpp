@@ -1,7 +1,5 @@
 #include "tools/import/vtk_source/vtk_source.h"
 
-#include <array>
-
 #include <vtkLongLongArray.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtk_cgns.h>
@@ -228,9 +226,9 @@ TEST(Polyhedra, OfVtkHdfAreReadOfEachPart) {
   expect_linear(folder / "a.vtkhdf", 17 * 5 * 5);
 }
 
-/// A number that tells positions, components and steps of time apart.
-double velocity(const double* p, int component, int step) {
-  return (component + 1) * p[0] + 10 * p[1] - (component + 2) * p[2] + 100 * step;
+/// A vector that tells positions and steps of time apart.
+Vector3d velocity(const Vector3d& p, int step) {
+  return (10 * p.y() + 100 * step + (Vector3d(1, 2, 3) * p.x() - Vector3d(2, 3, 4) * p.z()).array()).matrix();
 }
 
 void check(int error) { ASSERT_EQ(error, CG_OK) << cg_get_error(); }
@@ -241,70 +239,76 @@ std::vector<double> zone_values(double first_x, bool of_cells, const Value& valu
   const int nx = of_cells ? 2 : 3, ny = of_cells ? 3 : 4, nz = of_cells ? 4 : 5;
   const double shift = of_cells ? 0.5 : 0;
   std::vector<double> values;
-  for (int i = 0; i < nx * ny * nz; ++i) {
-    const double p[3] = {first_x + i % nx + shift, 0.5 * (i / nx % ny + shift), 0.25 * (i / nx / ny + shift)};
-    values.push_back(value(p));
-  }
+  for (int i = 0; i < nx * ny * nz; ++i)
+    values.push_back(
+        value(Vector3d(first_x + i % nx + shift, 0.5 * (i / nx % ny + shift), 0.25 * (i / nx / ny + shift))));
   return values;
 }
 
+constexpr int base = 1;  ///< The number of a file's first and only one.
+
 /// A solution with the velocity of a step at points or at cells.
-void write_solution(int file, int base, int zone, const std::string& name, double first_x, bool of_cells, int step) {
+void write_solution(int file, int zone, const std::string& name, double first_x, bool of_cells, int step) {
   int solution = 0, id = 0;
   check(
       cg_sol_write(file, base, zone, name.c_str(), of_cells ? CGNS_ENUMV(CellCenter) : CGNS_ENUMV(Vertex), &solution));
-  for (int c = 0; c < 3; ++c)
-    check(cg_field_write(
-        file, base, zone, solution, CGNS_ENUMV(RealDouble), (std::string("Velocity") + "XYZ"[c]).c_str(),
-        zone_values(first_x, of_cells, [=](const double* p) { return velocity(p, c, step); }).data(), &id));
+  for (int c = 0; c < 3; ++c) {
+    const auto values = zone_values(first_x, of_cells, [&](const Vector3d& p) { return velocity(p, step)[c]; });
+    const std::string field = std::string("Velocity") + "XYZ"[c];
+    check(cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealDouble), field.c_str(), values.data(), &id));
+  }
 }
 
-void write_zone(int file, int base, const std::string& name, double first_x, int steps) {
-  const std::array<cgsize_t, 9> size{3, 4, 5, 2, 3, 4};
+void write_zone(int file, const std::string& name, double first_x, int steps) {
+  const cgsize_t size[9] = {3, 4, 5, 2, 3, 4}, shape[] = {32, steps};
   int zone = 0, id = 0;
-  check(cg_zone_write(file, base, name.c_str(), size.data(), CGNS_ENUMV(Structured), &zone));
-  for (int axis = 0; axis < 3; ++axis)
-    check(cg_coord_write(file, base, zone, CGNS_ENUMV(RealDouble), (std::string("Coordinate") + "XYZ"[axis]).c_str(),
-                         zone_values(first_x, false, [axis](const double* p) { return p[axis]; }).data(), &id));
+  check(cg_zone_write(file, base, name.c_str(), size, CGNS_ENUMV(Structured), &zone));
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto values = zone_values(first_x, false, [&](const Vector3d& p) { return p[axis]; });
+    const std::string coordinate = std::string("Coordinate") + "XYZ"[axis];
+    check(cg_coord_write(file, base, zone, CGNS_ENUMV(RealDouble), coordinate.c_str(), values.data(), &id));
+  }
   std::string solutions;
   for (int step = 0; step < steps; ++step) {
     const std::string of_step = "Solution" + std::to_string(step);
     solutions += of_step + std::string(32 - of_step.size(), ' ');
-    write_solution(file, base, zone, of_step, first_x, false, step);
+    write_solution(file, zone, of_step, first_x, false, step);
   }
-  if (steps == 1) return write_solution(file, base, zone, "OfCells", first_x, true, 0);
-  const std::array<cgsize_t, 2> shape{32, steps};
+  if (steps == 1) return write_solution(file, zone, "OfCells", first_x, true, 0);
   check(cg_ziter_write(file, base, zone, "ZoneIterativeData"));
   check(cg_goto(file, base, "Zone_t", zone, "ZoneIterativeData_t", 1, "end"));
-  check(cg_array_write("FlowSolutionPointers", CGNS_ENUMV(Character), 2, shape.data(), solutions.data()));
+  check(cg_array_write("FlowSolutionPointers", CGNS_ENUMV(Character), 2, shape, solutions.data()));
 }
 
 /// Two zones that meet at x = 2.
 void write_cgns(const std::filesystem::path& path, int type, int steps) {
-  int file = 0, base = 0;
+  int file = 0, number = 0;
   check(cg_set_file_type(type));
   check(cg_open(path.c_str(), CG_MODE_WRITE, &file));
-  check(cg_base_write(file, "Base", 3, 3, &base));
+  check(cg_base_write(file, "Base", 3, 3, &number));
+  ASSERT_EQ(number, base);
   if (steps > 1) {
-    const std::vector<double> times{0.5, 1, 1.5};
+    const double times[] = {0.5, 1, 1.5};
     const cgsize_t count = steps;
     check(cg_biter_write(file, base, "BaseIterativeData", steps));
     check(cg_goto(file, base, "BaseIterativeData_t", 1, "end"));
-    check(cg_array_write("TimeValues", CGNS_ENUMV(RealDouble), 1, &count, times.data()));
+    check(cg_array_write("TimeValues", CGNS_ENUMV(RealDouble), 1, &count, times));
   }
-  write_zone(file, base, "left", 0, steps);
-  write_zone(file, base, "right", 2, steps);
+  write_zone(file, "left", 0, steps);
+  write_zone(file, "right", 2, steps);
   check(cg_close(file));
 }
 
-void expect_velocity(vtkDataSet& data, int step) {
+/// Expects the velocity of a step at all points, or at the middles of all cells.
+void expect_velocity(vtkDataSet& data, int step, bool of_cells = false) {
   EXPECT_EQ(data.GetNumberOfPoints(), 5 * 4 * 5);  // The points where zones meet are merged.
   EXPECT_EQ(data.GetNumberOfCells(), 4 * 3 * 4);
-  vtkDataArray* const read = data.GetPointData()->GetArray("Velocity");
+  vtkDataArray* const read =
+      data.GetAttributes(of_cells ? vtkDataObject::CELL : vtkDataObject::POINT)->GetArray("Velocity");
   ASSERT_TRUE(read && read->GetNumberOfComponents() == 3);
-  for (vtkIdType i = 0; i < data.GetNumberOfPoints(); ++i)
-    for (int component = 0; component < 3; ++component)
-      EXPECT_EQ(read->GetComponent(i, component), velocity(data.GetPoint(i), component, step));
+  for (vtkIdType i = 0; i < read->GetNumberOfTuples(); ++i)
+    EXPECT_EQ(Vector3d(read->GetTuple3(i)),
+              velocity(of_cells ? mesh_fixtures::middle_of(*data.GetCell(i)) : Vector3d(data.GetPoint(i)), step));
 }
 
 TEST(Cgns, ZonesAreOneMeshInBothFormatsWithValuesAtPointsAndCells) {
@@ -313,12 +317,7 @@ TEST(Cgns, ZonesAreOneMeshInBothFormatsWithValuesAtPointsAndCells) {
     write_cgns(folder / "a.cgns", type, 1);
     EXPECT_EQ(time_steps(folder / "a.cgns"), 1);
     const auto read = read_vtk_source(folder / "a.cgns");
-    expect_velocity(*read, 0);
-    vtkDataArray* const of_cells = read->GetCellData()->GetArray("Velocity");
-    ASSERT_TRUE(of_cells && of_cells->GetNumberOfComponents() == 3);
-    for (vtkIdType i = 0; i < read->GetNumberOfCells(); ++i)
-      for (int c = 0; c < 3; ++c)
-        EXPECT_EQ(of_cells->GetComponent(i, c), velocity(mesh_fixtures::middle_of(*read->GetCell(i)).data(), c, 0));
+    for (const bool of_cells : {false, true}) expect_velocity(*read, 0, of_cells);
     std::filesystem::remove(folder / "a.cgns");
   }
 }
