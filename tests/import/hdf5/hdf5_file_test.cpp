@@ -290,14 +290,22 @@ std::string attribute(const std::string& name, int first) {
                      name, first, first + 1, first + 2, first + 3, first + 4);
 }
 
-vtkSmartPointer<vtkDataSet> read(const fs::path& folder, const std::string& text, std::optional<int> step = {}) {
-  write_bytes(folder / "a.xdmf", text);
-  return read_vtk_source(folder / "a.xdmf", step);
-}
+class Xdmf : public testing::Test {
+ protected:
+  vtkSmartPointer<vtkDataSet> read(const std::string& text, std::optional<int> step = {}) const {
+    write_bytes(folder_ / "a.xdmf", text);
+    return read_vtk_source(folder_ / "a.xdmf", step);
+  }
 
-TEST(Xdmf, AGridInTheFileItself) {
-  const TemporaryFolder folder;
-  const auto mesh = read(folder, grid_document(mesh_items + attribute("f", 7) + R"(
+  void refuses(const std::string& text, const char* words) const {
+    EXPECT_THAT(error_of([&] { read(text); }), HasSubstr(words));
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Xdmf, AGridInTheFileItself) {
+  const auto mesh = read(grid_document(mesh_items + attribute("f", 7) + R"(
     <Attribute Name="S" AttributeType="Tensor" Center="Cell"><DataItem Dimensions="2 9" Format="XML">
       1 2 3 4 5 6 7 8 9  11 12 13 14 15 16 17 18 19</DataItem></Attribute>)"));
   EXPECT_EQ(mesh->GetNumberOfCells(), 2);
@@ -309,8 +317,7 @@ TEST(Xdmf, AGridInTheFileItself) {
 }
 
 /// A mesh, and for each function a collection of grids in time that include the mesh: as FEniCSx writes it.
-TEST(Xdmf, FunctionsOfFenicsxShareTheirMesh) {
-  const TemporaryFolder folder;
+TEST_F(Xdmf, FunctionsOfFenicsxShareTheirMesh) {
   const auto function = [](const std::string& name, int first) {
     std::string grids;
     for (const int step : {0, 1})
@@ -322,19 +329,18 @@ TEST(Xdmf, FunctionsOfFenicsxShareTheirMesh) {
   };
   const std::string text = document("<Grid Name=\"mesh\" GridType=\"Uniform\">" + mesh_items + "</Grid>" +
                                     function("f", 1) + function("g", 50));
-  const auto last = read(folder, text), first = read(folder, text, 0);
-  EXPECT_EQ(time_steps(folder / "a.xdmf"), 2);
+  const auto last = read(text), first = read(text, 0);
+  EXPECT_EQ(time_steps(folder_ / "a.xdmf"), 2);
   EXPECT_EQ(last->GetNumberOfCells(), 2);
   EXPECT_EQ(last->GetPointData()->GetArray("f")->GetComponent(0, 0), 101);
   EXPECT_EQ(last->GetPointData()->GetArray("g")->GetComponent(0, 0), 150);
   EXPECT_EQ(first->GetPointData()->GetArray("f")->GetComponent(0, 0), 1);
-  EXPECT_THROW(read(folder, text, 2), std::invalid_argument);
+  EXPECT_THROW(read(text, 2), std::invalid_argument);
 }
 
-TEST(Xdmf, NumbersInHdf5WithReferencesSlabsAndEntities) {
-  const TemporaryFolder folder;
+TEST_F(Xdmf, NumbersInHdf5WithReferencesSlabsAndEntities) {
   {
-    Hdf5Writer file(folder / "b.h5");
+    Hdf5Writer file(folder_ / "b.h5");
     file.write("/geometry/vertices", {5, 3}, Doubles{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1});
     file.write("/topology/cells", {2, 4}, Ints{0, 1, 2, 3, 1, 2, 3, 4});
     file.write("/fields/u", {2, 5, 3}, counting(2 * 5 * 3));
@@ -363,7 +369,7 @@ TEST(Xdmf, NumbersInHdf5WithReferencesSlabsAndEntities) {
        </DataItem></Attribute>
      </Grid></Grid>)xml",
                                     "<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" [ <!ENTITY HeavyData \"b.h5\"> ]>\n");
-  const auto mesh = read(folder, text);
+  const auto mesh = read(text);
   ASSERT_EQ(mesh->GetNumberOfPoints(), 5);
   vtkDataArray &u = *mesh->GetPointData()->GetArray("u"), &joined = *mesh->GetPointData()->GetArray("joined");
   for (int i = 0; i < 5; ++i) {
@@ -373,9 +379,8 @@ TEST(Xdmf, NumbersInHdf5WithReferencesSlabsAndEntities) {
   }
 }
 
-TEST(Xdmf, MixedCellsOrderedMeshesAndBinaryFiles) {
-  const TemporaryFolder folder;
-  const auto mixed = read(folder, document(R"(<Grid><Topology TopologyType="Mixed" NumberOfElements="3">
+TEST_F(Xdmf, MixedCellsOrderedMeshesAndBinaryFiles) {
+  const auto mixed = read(document(R"(<Grid><Topology TopologyType="Mixed" NumberOfElements="3">
       <DataItem Dimensions="12" NumberType="Int" Format="XML">6 0 1 2 3  1 1 4  4 1 2 3 </DataItem></Topology>
     <Geometry GeometryType="X_Y_Z"><DataItem Format="XML" Dimensions="5">0 1 0 0 1</DataItem>
       <DataItem Format="XML" Dimensions="5">0 0 1 0 1</DataItem>
@@ -388,8 +393,8 @@ TEST(Xdmf, MixedCellsOrderedMeshesAndBinaryFiles) {
 
   std::string numbers = "skip";
   for (int i = 0; i < 24; ++i) append_number(static_cast<float>(i), ByteOrder::big, numbers);
-  write_bytes(folder / "f.raw", numbers);
-  const auto image = read(folder, document(R"(<Grid><Topology TopologyType="3DCoRectMesh" Dimensions="2 3 4"/>
+  write_bytes(folder_ / "f.raw", numbers);
+  const auto image = read(document(R"(<Grid><Topology TopologyType="3DCoRectMesh" Dimensions="2 3 4"/>
     <Geometry GeometryType="ORIGIN_DXDYDZ"><DataItem Dimensions="3" Format="XML">10 20 30</DataItem>
       <DataItem Dimensions="3" Format="XML">1 2 3</DataItem></Geometry>
     <Attribute Name="f"><DataItem Dimensions="2 3 4" Format="Binary" Endian="Big" Seek="4" NumberType="Float"
@@ -400,7 +405,7 @@ TEST(Xdmf, MixedCellsOrderedMeshesAndBinaryFiles) {
   EXPECT_THAT(bounds, testing::ElementsAre(30, 39, 20, 24, 10, 11));
   EXPECT_EQ(image->GetPointData()->GetArray("f")->GetComponent(23, 0), 23);
 
-  const auto rectilinear = read(folder, document(R"(<Grid><Topology TopologyType="3DRectMesh" Dimensions="2 1 3"/>
+  const auto rectilinear = read(document(R"(<Grid><Topology TopologyType="3DRectMesh" Dimensions="2 1 3"/>
     <Geometry GeometryType="VXVYVZ"><DataItem Dimensions="3" Format="XML">0 1 5</DataItem>
       <DataItem Dimensions="1" Format="XML">7</DataItem><DataItem Dimensions="2" Format="XML">0 3</DataItem>
     </Geometry></Grid>)"));
@@ -408,17 +413,13 @@ TEST(Xdmf, MixedCellsOrderedMeshesAndBinaryFiles) {
   EXPECT_EQ(rectilinear->GetPoint(2)[0], 5);
   EXPECT_EQ(rectilinear->GetPoint(2)[1], 7);
 
-  const auto structured = read(folder, document(R"(<Grid><Topology TopologyType="2DSMesh" Dimensions="2 2"/>
+  const auto structured = read(document(R"(<Grid><Topology TopologyType="2DSMesh" Dimensions="2 2"/>
     <Geometry GeometryType="XY"><DataItem Dimensions="4 2" Format="XML">0 0 1 0 0 1 2 2</DataItem></Geometry></Grid>)"));
   ASSERT_TRUE(vtkStructuredGrid::SafeDownCast(structured));
   EXPECT_EQ(structured->GetPoint(3)[1], 2);
 }
 
-TEST(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
-  const TemporaryFolder folder;
-  const auto refuses = [&](const std::string& text, const char* words) {
-    EXPECT_THAT(error_of([&] { read(folder, text); }), HasSubstr(words));
-  };
+TEST_F(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
   const auto changed = [](const std::string& from, const std::string& to) {
     return replaced_text(grid_document(mesh_items), from, to);
   };
@@ -439,7 +440,7 @@ TEST(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
   refuses(changed("Tetrahedron", "Wurtzite"), "type wurtzite");
   refuses(changed("0 0 0  1 0 0", "0 0 0  1 0 x"), "no numbers");
   refuses(changed("Format=\"XML\">0 0", "Format=\"HDF\">none.h5:/x"), "none.h5: is missing");
-  write_bytes(folder / "b.h5", "\x89HDF\r\n\x1a\n and no more");
+  write_bytes(folder_ / "b.h5", "\x89HDF\r\n\x1a\n and no more");
   refuses(changed("Format=\"XML\">0 0", "Format=\"HDF\">b.h5:/x"), "b.h5: is no HDF5");
   refuses(with_array("<DataItem Format=\"XML\">1 2</DataItem>"), "2 numbers for 5 points");
   refuses(with_array("<DataItem Reference=\"XML\">/Xdmf/Domain/Grid/Attribute/DataItem</DataItem>"),
@@ -457,21 +458,18 @@ TEST(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
   refuses(ordered("3DSMesh", "2 2 2", "XYZ", {"0 0 0  1 0 0"}), "another number of points");
 }
 
-TEST(Xdmf, BlocksThatShareTheirPointsAreNotTheSameMesh) {
-  const TemporaryFolder folder;
+TEST_F(Xdmf, BlocksThatShareTheirPointsAreNotTheSameMesh) {
   std::string grids;
   for (const std::string cell : {"0 1 2 3", "1 2 3 4"}) {
     const std::string items = replaced_text(replaced_text(mesh_items, "2 4\"", "1 4\""), "0 1 2 3  1 2 3 4", cell);
     grids += "<Grid Name=\"" + cell + "\">" + items + attribute("f", 7) + "</Grid>";
   }
-  const auto mesh =
-      read(folder, document("<Grid GridType=\"Collection\" CollectionType=\"Spatial\">" + grids + "</Grid>"));
+  const auto mesh = read(document("<Grid GridType=\"Collection\" CollectionType=\"Spatial\">" + grids + "</Grid>"));
   EXPECT_EQ(mesh->GetNumberOfCells(), 2);
   EXPECT_EQ(mesh->GetNumberOfPoints(), 5);
 }
 
-TEST(Xdmf, PointsMayBeCountedFromOne) {
-  const TemporaryFolder folder;
+TEST_F(Xdmf, PointsMayBeCountedFromOne) {
   const auto with = [](const std::string& type, const std::string& attributes, const std::string& cells) {
     const std::string items =
         replaced_text(replaced_text(mesh_items, "Tetrahedron\"", type + "\" " + attributes), "0 1 2 3  1 2 3 4", cells);
@@ -479,13 +477,12 @@ TEST(Xdmf, PointsMayBeCountedFromOne) {
   };
   for (const std::string& text : {with("Tetrahedron", "BaseOffset=\"1\"", "1 2 3 4  2 3 4 5"),
                                   with("Mixed", "BaseOffset=\"1\"", "6 1 2 3 4  6 2 3 4 5")}) {
-    const auto mesh = read(folder, text);
+    const auto mesh = read(text);
     ASSERT_EQ(mesh->GetNumberOfCells(), 2);
     EXPECT_EQ(mesh->GetCell(1)->GetPointId(3), 4);
     EXPECT_EQ(mesh->GetCell(0)->GetPointId(0), 0);
   }
-  const std::string ordered = with("Tetrahedron", "Order=\"3 2 1 0\"", "0 1 2 3  1 2 3 4");
-  EXPECT_THAT(error_of([&] { read(folder, ordered); }), HasSubstr("order of points of their own"));
+  refuses(with("Tetrahedron", "Order=\"3 2 1 0\"", "0 1 2 3  1 2 3 4"), "order of points of their own");
 }
 
 }  // namespace

@@ -20,9 +20,8 @@ double thin_layer(const Vector3d& p) { return std::exp(-p.x() / 0.05); }
 double fine_spot(const Vector3d& p) { return std::exp(-(p - Vector3d::Constant(0.5)).squaredNorm() / (0.06 * 0.06)); }
 
 Grid mesh_of(int type, int n, const Map& map, const Profile& profile) {
-  Grid mesh = unit_cube(type, n, map);
-  add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) { return flat(Matrix3d::Identity() * profile(p)); });
-  return mesh;
+  return with_field(unit_cube(type, n, map),
+                    [&](const Vector3d& p) { return Matrix3d(Matrix3d::Identity() * profile(p)); });
 }
 
 /// What voxels of a level differ from a profile by at most, and the farthest of their centres along x.
@@ -64,8 +63,7 @@ TEST(MeshLevels, ALayerAtAWallHasFinerVoxelsInCellsOfEveryFamily) {
 TEST(MeshLevels, LinearFieldsEvenCellsAndLargeCellsHaveOneLevel) {
   for (const int type : families) {
     SCOPED_TRACE(type);
-    const Grid linear = unit_cube(type, 12, graded);
-    add_array<9>(*linear, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
+    const Grid linear = with_field(unit_cube(type, 12, graded));
     EXPECT_TRUE(sampled(*linear, resolution(0.08)).grid.finer.empty());
     const Grid even = mesh_of(type, 12, unchanged, thin_layer);
     if (type == VTK_PYRAMID || type == VTK_TETRA || type == VTK_QUADRATIC_TETRA) continue;  // Thinner than cubes.

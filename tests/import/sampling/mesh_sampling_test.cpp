@@ -16,10 +16,6 @@ namespace {
 
 using namespace mesh_fixtures;
 
-void add_linear_tensor(vtkDataSet& mesh) {
-  add_array<9>(mesh, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
-}
-
 /// The greatest difference of a component from the value at its voxel.
 template <class Value>
 double worst_error(const TensorGrid& grid, const Value& value) {
@@ -42,8 +38,7 @@ TEST(MeshSampling, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
     for (const bool is_bent : {false, true}) {
       if (is_bent && type == VTK_PYRAMID) continue;  // Its sides would be gaps.
       SCOPED_TRACE(testing::Message() << type << is_bent);
-      const auto mesh = unit_cube(type, 3, is_bent ? Map(bent) : unchanged);
-      add_linear_tensor(*mesh);
+      const auto mesh = with_field(unit_cube(type, 3, is_bent ? Map(bent) : unchanged));
       const auto [grid, report] = sampled(*mesh, resolution(13));
       EXPECT_EQ(report.size, Vector3i::Constant(13));
       EXPECT_EQ(report.active, 13u * 13 * 13);
@@ -53,16 +48,14 @@ TEST(MeshSampling, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
 }
 
 TEST(MeshSampling, QuadraticCellsGiveAQuadraticFieldExactly) {
-  const auto mesh = unit_cube(VTK_QUADRATIC_TETRA, 2, unchanged);
   const auto value = [](const Vector3d& p) { return Matrix3d(linear_tensor(p) * (1 + p.x() - 2 * p.y() + p.z())); };
-  add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) { return flat(value(p)); });
+  const auto mesh = with_field(unit_cube(VTK_QUADRATIC_TETRA, 2, unchanged), value);
   EXPECT_LT(worst_error(sampled(*mesh, resolution(15)).grid, value), 1e-5);
 }
 
 TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
-  const auto mesh =
-      unit_cube(VTK_HEXAHEDRON, 4, [](const Vector3d& p) { return Vector3d(2 * p.x() + 1, p.y(), p.z() / 2); });
-  add_linear_tensor(*mesh);
+  const auto mesh = with_field(
+      unit_cube(VTK_HEXAHEDRON, 4, [](const Vector3d& p) { return Vector3d(2 * p.x() + 1, p.y(), p.z() / 2); }));
   const Sampled longest = sampled(*mesh, resolution(21));
   EXPECT_EQ(longest.report.size, Vector3i(21, 11, 6));
   EXPECT_NEAR(longest.report.voxel.x(), 0.1, 1e-12);
@@ -114,8 +107,7 @@ TEST(MeshSampling, ThinBodiesGetVoxelsAcrossThem) {
        0.47, 0.5 * 6.2 * (4.5 * 4.5 - 4 * 4) * 10}};
   for (const Case& each : cases) {
     SCOPED_TRACE(each.name);
-    const auto mesh = curvilinear({11, 41, 3}, each.map);
-    add_linear_tensor(*mesh);
+    const auto mesh = with_field(curvilinear({11, 41, 3}, each.map));
     SamplingSettings settings;
     settings.thickness = each.thickness;
     const auto [grid, report] = sampled(*mesh, settings);
@@ -134,9 +126,8 @@ TEST(MeshSampling, ThinBodiesGetVoxelsAcrossThem) {
 // needs.
 TEST(MeshSampling, LargeThinBodiesGetThemByLevels) {
   const auto turn = Eigen::AngleAxisd(0.4, Vector3d(1, 2, 0).normalized());
-  const auto mesh =
-      curvilinear({41, 31, 2}, [&](const Vector3d& p) { return turn * Vector3d(60 * p.x(), 45 * p.y(), p.z()); });
-  add_linear_tensor(*mesh);
+  const auto mesh = with_field(
+      curvilinear({41, 31, 2}, [&](const Vector3d& p) { return turn * Vector3d(60 * p.x(), 45 * p.y(), p.z()); }));
   SamplingSettings settings;
   settings.thickness = 0.96;
   const SamplingReport report = sampled(*mesh, settings).report;
@@ -147,9 +138,8 @@ TEST(MeshSampling, LargeThinBodiesGetThemByLevels) {
 
 TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {
   // 200 thin slices beside a long cell: for the median cell, 10^7 voxels would be needed.
-  const auto mesh = curvilinear(
-      {202, 2, 2}, [](const Vector3d& p) { return Vector3d(p.x() < 0.999 ? p.x() * 1e-4 : 1.0, p.y(), p.z()); });
-  add_linear_tensor(*mesh);
+  const auto mesh = with_field(curvilinear(
+      {202, 2, 2}, [](const Vector3d& p) { return Vector3d(p.x() < 0.999 ? p.x() * 1e-4 : 1.0, p.y(), p.z()); }));
   SamplingSettings settings;
   settings.levels = 1;
   const double voxels = sampling_lattice(*mesh, solid_part(*mesh), settings).size.cast<double>().prod();
@@ -158,8 +148,7 @@ TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {
 }
 
 TEST(MeshSampling, BoundsCropTheLatticeAndTheReport) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 4, unchanged);
-  add_linear_tensor(*mesh);
+  const auto mesh = with_field(unit_cube(VTK_HEXAHEDRON, 4, unchanged));
   SamplingSettings settings = resolution(0.125);
   settings.bounds = AlignedBox3d(Vector3d(0.25, 0.25, 0), Vector3d(0.5, 0.5, 2));
   const auto [grid, report] = sampled(*mesh, settings);
@@ -176,9 +165,8 @@ TEST(MeshSampling, BoundsCropTheLatticeAndTheReport) {
 TEST(MeshSampling, ReportsThePeakThatCoarseVoxelsMiss) {
   // |T| = √3 max(0, 1 − 8 |x − 1/16|) on cells of edge 1/16. Voxels of edge 1/8 miss the peak by half a tooth, where
   // |T| has half its peak value.
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 16, unchanged);
-  add_array<9>(*mesh, tensor_array, [](const Vector3d& p) {
-    return flat(Matrix3d::Identity() * std::max(0.0, 1 - 8 * std::abs(p.x() - 0.0625)));
+  const auto mesh = with_field(unit_cube(VTK_HEXAHEDRON, 16, unchanged), [](const Vector3d& p) {
+    return Matrix3d(Matrix3d::Identity() * std::max(0.0, 1 - 8 * std::abs(p.x() - 0.0625)));
   });
   SamplingSettings coarse = resolution(9);
   coarse.levels = 1;
@@ -193,11 +181,8 @@ TEST(MeshSampling, OfCellsThatListMorePointsThanTheirTypeHasTheFirstCount) {
   const auto quadratic = unit_cube(VTK_QUADRATIC_HEXAHEDRON, 2, unchanged);
   const auto mesh = Grid::New();
   mesh->SetPoints(quadratic->GetPoints());
-  for (vtkIdType i = 0; i < quadratic->GetNumberOfCells(); ++i) {
-    vtkNew<vtkIdList> ids;
-    quadratic->GetCellPoints(i, ids);
-    mesh->InsertNextCell(VTK_HEXAHEDRON, ids);
-  }
+  for (vtkIdType i = 0; i < quadratic->GetNumberOfCells(); ++i)
+    mesh->InsertNextCell(VTK_HEXAHEDRON, quadratic->GetCell(i)->GetPointIds());
   vtkIdType point = 0;
   add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) {
     return Eigen::Matrix<double, 9, 1>(flat(linear_tensor(p)) * (point++ % 20 < 8 ? 1 : 0));
@@ -223,8 +208,7 @@ TEST(MeshSampling, OverlappingCellsGiveTheSameOnAnyNumberOfThreads) {
 }
 
 TEST(MeshSampling, StopsWhenCancelledAndReportsToTheCaller) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 3, unchanged);
-  add_linear_tensor(*mesh);
+  const auto mesh = with_field(unit_cube(VTK_HEXAHEDRON, 3, unchanged));
   SamplingReport report;
   Progress progress;
   std::uint64_t last = 0, total = 0;
@@ -237,10 +221,9 @@ TEST(MeshSampling, StopsWhenCancelledAndReportsToTheCaller) {
 }
 
 TEST(MeshSampling, RefusesWhatCannotBeSampled) {
-  const auto cube = unit_cube(VTK_HEXAHEDRON, 1, unchanged);
-  add_linear_tensor(*cube);
-  const auto flat_mesh = curvilinear({4, 4, 1}, [](const Vector3d& p) { return Vector3d(p.x(), p.y(), 0); });
-  add_linear_tensor(*flat_mesh);
+  const auto cube = with_field(unit_cube(VTK_HEXAHEDRON, 1, unchanged));
+  const auto flat_mesh =
+      with_field(curvilinear({4, 4, 1}, [](const Vector3d& p) { return Vector3d(p.x(), p.y(), 0); }));
   EXPECT_THAT([&] { sampled(*flat_mesh); }, ThrowsMessage<std::invalid_argument>(HasSubstr("flat")));
   const auto refuses = [&](const SamplingSettings& settings, const char* part) {
     EXPECT_THAT([&] { sampled(*cube, settings); }, ThrowsMessage<std::invalid_argument>(HasSubstr(part)));
@@ -255,7 +238,7 @@ TEST(MeshSampling, RefusesWhatCannotBeSampled) {
   refuses(settings, "nothing of the mesh is inside, which goes from (0, 0, 0) to (1, 1, 1)");
   settings.bounds = AlignedBox3d(Vector3d(0, 0, 0), Vector3d(1, 0, 1));
   refuses(settings, "is not a box");
-  add_array<9>(*cube, tensor_array, [](const Vector3d&) { return flat(Matrix3d::Constant(NAN)); });
+  with_field(cube, [](const Vector3d&) { return Matrix3d(Matrix3d::Constant(NAN)); });
   refuses(resolution(3), "all 8 points have NaN or infinite tensors");
 }
 
@@ -273,9 +256,7 @@ vtkSmartPointer<vtkStructuredGrid> mesh_of_layer(const Map& map) {
   const auto mesh = curvilinear({5, 5, 61}, [&](const Vector3d& p) {
     return map(Vector3d(p.x(), p.y(), std::expm1(5 * p.z()) / std::expm1(5)));
   });
-  add_array<9>(*mesh, tensor_array,
-               [](const Vector3d& p) { return flat(std::exp(-p.z() / layer) * Matrix3d::Identity()); });
-  return mesh;
+  return with_field(mesh, [](const Vector3d& p) { return Matrix3d(std::exp(-p.z() / layer) * Matrix3d::Identity()); });
 }
 
 TEST(VoxelAverages, OfABoundaryLayerHaveLessErrorThanTheirCentres) {
@@ -295,8 +276,7 @@ TEST(VoxelAverages, OfABoundaryLayerHaveLessErrorThanTheirCentres) {
 
 TEST(VoxelAverages, OfALinearFieldAreItsValuesAtTheCentresAlsoAtWalls) {
   for (const int type : {VTK_HEXAHEDRON, VTK_TETRA, VTK_WEDGE, VTK_PYRAMID, VTK_QUADRATIC_HEXAHEDRON}) {
-    const auto mesh = unit_cube(type, 12, bent);
-    add_linear_tensor(*mesh);
+    const auto mesh = with_field(unit_cube(type, 12, bent));
     const auto [grid, report] = sampled(*mesh, resolution(0.25));
     EXPECT_LT(worst_error(grid, linear_tensor), 5e-5) << type;
     EXPECT_EQ(report.active, 125u) << type;
@@ -304,11 +284,10 @@ TEST(VoxelAverages, OfALinearFieldAreItsValuesAtTheCentresAlsoAtWalls) {
 }
 
 TEST(VoxelAverages, WhereCellsAreAsLargeAsVoxelsCentresCount) {
-  const auto mesh = unit_cube(VTK_HEXAHEDRON, 4, unchanged);
-  const auto value = [](const Vector3d& p) { return std::sin(9 * p.x()); };
-  add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) { return flat(value(p) * Matrix3d::Identity()); });
+  const auto value = [](const Vector3d& p) { return Matrix3d(std::sin(9 * p.x()) * Matrix3d::Identity()); };
+  const auto mesh = with_field(unit_cube(VTK_HEXAHEDRON, 4, unchanged), value);
   for_each_voxel(sampled(*mesh, resolution(0.25)).grid, [&](const Vector3d& p, const Matrix3d& tensor) {
-    EXPECT_EQ(static_cast<float>(tensor(0, 0)), static_cast<float>(value(p)));
+    EXPECT_EQ(tensor.cast<float>(), value(p).cast<float>());
   });
 }
 
@@ -358,12 +337,11 @@ const Affine3d to_oblique =
 
 class EveryCellType : public ::testing::TestWithParam<CellKind> {
  protected:
-  const Grid mesh_ = one_cell(GetParam(), to_oblique);
+  const Grid mesh_ = with_field(one_cell(GetParam(), to_oblique));
   const double volume_ = parametric_volume(GetParam()) * to_oblique.linear().determinant();
 };
 
 TEST_P(EveryCellType, SampledVolumeIsThatOfTheCell) {
-  add_linear_tensor(*mesh_);
   const auto [grid, report] = sampled(*mesh_, resolution(14));
   EXPECT_NEAR(static_cast<double>(report.active) * report.voxel.prod(), volume_, 0.12 * volume_);
   EXPECT_LT(worst_error(grid, linear_tensor), 5e-5);

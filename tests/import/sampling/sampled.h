@@ -13,6 +13,13 @@ namespace tensorray::mesh_fixtures {
 inline constexpr int families[] = {VTK_HEXAHEDRON,      VTK_LAGRANGE_HEXAHEDRON, VTK_WEDGE, VTK_PYRAMID, VTK_TETRA,
                                    VTK_QUADRATIC_TETRA, VTK_QUADRATIC_HEXAHEDRON};
 
+/// The mesh with tensors at its points.
+template <class Mesh>
+Mesh with_field(const Mesh& mesh, const std::function<Matrix3d(const Vector3d&)>& value = linear_tensor) {
+  add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) { return flat(value(p)); });
+  return mesh;
+}
+
 /// Of a number of voxels along the longest edge or along each, or of their size.
 template <class Resolution>
 SamplingSettings resolution(const Resolution& value) {

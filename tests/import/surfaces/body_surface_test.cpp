@@ -100,9 +100,8 @@ class BodySurfaceOf : public ::testing::TestWithParam<CellKind> {};
 class BodySurfaceOfMany : public BodySurfaceOf {};
 
 TEST_P(BodySurfaceOf, OneCellIsItsOwn) {
-  Eigen::Affine3d map;
-  map.linear() << 1.1, 0.2, -0.1, 0.1, 0.9, 0.25, -0.3, 0.15, 1.3;
-  map.translation() << 3, -2, 5;
+  const Affine3d map =
+      Eigen::Translation3d(3, -2, 5) * (Matrix3d() << 1.1, 0.2, -0.1, 0.1, 0.9, 0.25, -0.3, 0.15, 1.3).finished();
   const BodySurface surface = surface_of(*one_cell(GetParam(), map), 1e-3);
   EXPECT_EQ(surface.open_edges, 0u);
   EXPECT_EQ(euler_characteristic(surface.mesh), 2);
@@ -157,12 +156,8 @@ TEST(BodySurface, CurvedCellsAreDividedAsTheToleranceSays) {
 Grid some_cells(vtkPointSet& mesh, const std::function<bool(vtkIdType)>& is_used) {
   auto grid = Grid::New();
   grid->SetPoints(mesh.GetPoints());
-  vtkNew<vtkIdList> ids;
-  for (vtkIdType i = 0; i < mesh.GetNumberOfCells(); ++i) {
-    if (!is_used(i)) continue;
-    mesh.GetCellPoints(i, ids);
-    grid->InsertNextCell(mesh.GetCellType(i), ids);
-  }
+  for (vtkIdType i = 0; i < mesh.GetNumberOfCells(); ++i)
+    if (is_used(i)) grid->InsertNextCell(mesh.GetCellType(i), mesh.GetCell(i)->GetPointIds());
   return grid;
 }
 
@@ -188,9 +183,8 @@ TEST(BodySurface, InnerFacesAreCountedAndThoseWithOtherDiagonalsAreGone) {
 
 TEST(BodySurface, CellsOfAnySenseLookOutwards) {
   const Grid box = divided({VTK_HEXAHEDRON}, 3, unchanged);
-  vtkNew<vtkIdList> ids;
   for (vtkIdType cell = 0; cell < 27; cell += 2) {
-    box->GetCellPoints(cell, ids);
+    vtkIdList* const ids = box->GetCell(cell)->GetPointIds();
     std::rotate(ids->begin(), ids->begin() + 4, ids->end());  // Mirrors it.
     box->GetCells()->ReplaceCellAtId(cell, ids);
   }
@@ -238,8 +232,8 @@ TEST(BodySurface, ABoxCutsIt) {
   const BodySurface ball = surface_of(*divided({VTK_QUADRATIC_HEXAHEDRON}, 6, to_ball), 1e-3);
   const auto check = [&](double from_x, double volume, double tolerance) {
     const TriangleMesh cap = cut_to(ball.mesh, {Vector3d(from_x, -2, -2), Vector3d(2, 2, 2)});
-    EXPECT_EQ(open_edges(cap), 0u);
-    EXPECT_NEAR(cap.volume(), volume, tolerance);
+    EXPECT_EQ(open_edges(cap), 0u) << from_x;
+    EXPECT_NEAR(cap.volume(), volume, tolerance) << from_x;
   };
   check(0, ball.mesh.volume() / 2, 1e-9);
   check(0.5, pi * 0.25 * 2.5 / 3, 3e-3);

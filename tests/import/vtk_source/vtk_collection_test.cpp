@@ -18,16 +18,26 @@ std::string collection(const std::string& type, const std::string& contents) {
 
 std::string series(const std::string& contents) { return collection("Collection", contents); }
 
-TEST(VtkCollection, BlocksAtAnyDepthAreOneMeshWithoutSurfaces) {
-  const TemporaryFolder folder;
-  std::filesystem::create_directory(folder / "parts & more");
-  write_xml(*bar(0, 3), folder / "parts & more" / "0.vtu");
-  write_xml(*bar(3, 2), folder / "1.vtu");
-  write_bytes(folder / "all.vtm", collection("vtkMultiBlockDataSet", R"(
+class VtkCollection : public testing::Test {
+ protected:
+  /// Expects that a file with this text is refused with these words.
+  void refuses(const std::string& name, const std::string& text, const std::string& words) const {
+    write_bytes(folder_ / name, text);
+    EXPECT_THAT(read_error(folder_ / name), HasSubstr(words));
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(VtkCollection, BlocksAtAnyDepthAreOneMeshWithoutSurfaces) {
+  std::filesystem::create_directory(folder_ / "parts & more");
+  write_xml(*bar(0, 3), folder_ / "parts & more" / "0.vtu");
+  write_xml(*bar(3, 2), folder_ / "1.vtu");
+  write_bytes(folder_ / "all.vtm", collection("vtkMultiBlockDataSet", R"(
     <DataSet index="0" file="parts &amp; more/0.vtu"/>
     <Block index="1"><Block index="0"><DataSet index="0" file="1.vtu"/><DataSet index="1" file="wall.vtp"/></Block>
     </Block><DataSet index="2"/>)"));
-  const auto read = read_vtk_source(folder / "all.vtm");
+  const auto read = read_vtk_source(folder_ / "all.vtm");
   EXPECT_EQ(read->GetNumberOfCells(), 5);
   EXPECT_EQ(read->GetNumberOfPoints(), 24);  // The points of the seam are merged.
   EXPECT_FALSE(read->GetCellData()->HasArray(layer_array));
@@ -35,92 +45,78 @@ TEST(VtkCollection, BlocksAtAnyDepthAreOneMeshWithoutSurfaces) {
     EXPECT_EQ(read->GetPointData()->GetArray("tensor")->GetComponent(i, 4), number(read->GetPoint(i), 4));
 }
 
-TEST(VtkCollection, OneImageStaysAnImage) {
-  const TemporaryFolder folder;
-  write_xml(*image(), folder / "a.vti");
-  write_bytes(folder / "a.vtm", blocks_of({"a.vti"}));
-  const auto read = read_vtk_source(folder / "a.vtm");
+TEST_F(VtkCollection, OneImageStaysAnImage) {
+  write_xml(*image(), folder_ / "a.vti");
+  write_bytes(folder_ / "a.vtm", blocks_of({"a.vti"}));
+  const auto read = read_vtk_source(folder_ / "a.vtm");
   EXPECT_TRUE(read->IsA("vtkImageData"));
   expect_same(*read, *image(), 0x1p-1000);
 }
 
-TEST(VtkCollection, OfATimeSeriesTheLastTimeWithAllItsParts) {
-  const TemporaryFolder folder;
-  write_xml(*bar(0, 1), folder / "early.vtu");
-  write_xml(*bar(0, 3), folder / "late0.vtu");
-  write_xml(*bar(3, 2), folder / "late1.vtu");
-  write_bytes(folder / "late.vtm", blocks_of({"late0.vtu", "late1.vtu"}));
-  write_bytes(folder / "parts.pvd", series(R"(<DataSet timestep="1e1" part="0" file="late0.vtu"/>
+TEST_F(VtkCollection, OfATimeSeriesTheLastTimeWithAllItsParts) {
+  write_xml(*bar(0, 1), folder_ / "early.vtu");
+  write_xml(*bar(0, 3), folder_ / "late0.vtu");
+  write_xml(*bar(3, 2), folder_ / "late1.vtu");
+  write_bytes(folder_ / "late.vtm", blocks_of({"late0.vtu", "late1.vtu"}));
+  write_bytes(folder_ / "parts.pvd", series(R"(<DataSet timestep="1e1" part="0" file="late0.vtu"/>
                                               <DataSet timestep="9" part="0" file="early.vtu"/>
                                               <DataSet timestep="10" part="1" file="late1.vtu"/>)"));
-  write_bytes(folder / "blocks.pvd", series(R"(<DataSet timestep="-2" file="early.vtu"/>
+  write_bytes(folder_ / "blocks.pvd", series(R"(<DataSet timestep="-2" file="early.vtu"/>
                                                <DataSet timestep="-1" file="late.vtm"/>)"));
   for (const char* name : {"parts.pvd", "blocks.pvd"}) {
-    EXPECT_EQ(time_steps(folder / name), 2);
+    EXPECT_EQ(time_steps(folder_ / name), 2);
     for (const auto& [step, cells] : {std::pair(std::optional<int>(), 5), {0, 1}, {1, 5}})
-      EXPECT_EQ(read_vtk_source(folder / name, step)->GetNumberOfCells(), cells) << name;
-    EXPECT_THROW(read_vtk_source(folder / name, 2), std::invalid_argument) << name;
+      EXPECT_EQ(read_vtk_source(folder_ / name, step)->GetNumberOfCells(), cells) << name;
+    EXPECT_THROW(read_vtk_source(folder_ / name, 2), std::invalid_argument) << name;
   }
 }
 
-TEST(VtkCollection, APartThatIsNamedTwiceForOneTimeCountsOnceOrIsRefused) {
-  const TemporaryFolder folder;
-  write_xml(*bar(0, 3), folder / "a.vtu");
+TEST_F(VtkCollection, APartThatIsNamedTwiceForOneTimeCountsOnceOrIsRefused) {
+  write_xml(*bar(0, 3), folder_ / "a.vtu");
   const auto other = bar(0, 3);
   other->GetPointData()->GetArray("tensor")->Fill(7);
-  write_xml(*other, folder / "restarted.vtu");
+  write_xml(*other, folder_ / "restarted.vtu");
   const std::string a = "<DataSet timestep=\"1\" part=\"0\" file=\"a.vtu\"/>\n";
   for (const std::string& again : {a, replaced_text(a, "a.vtu", "./a.vtu")}) {
-    write_bytes(folder / "same.pvd", series(a + again));
-    expect_same(*read_vtk_source(folder / "same.pvd"), *bar(0, 3), 0x1p-1000);
+    write_bytes(folder_ / "same.pvd", series(a + again));
+    expect_same(*read_vtk_source(folder_ / "same.pvd"), *bar(0, 3), 0x1p-1000);
   }
-  for (const char* part : {"part=\"0\" ", ""}) {
-    write_bytes(folder / "both.pvd", series(a + "<DataSet timestep=\"1\" " + part + "file=\"restarted.vtu\"/>\n"));
-    EXPECT_THAT(read_error(folder / "both.pvd"),
-                HasSubstr("both.pvd: names the same mesh twice for one time, as a.vtu and as restarted.vtu"));
-  }
-  write_bytes(folder / "both.vtm", blocks_of({"a.vtu", "restarted.vtu"}));
-  EXPECT_THAT(read_error(folder / "both.vtm"), HasSubstr("names the same mesh twice"));
+  for (const char* part : {"part=\"0\" ", ""})
+    refuses("both.pvd", series(a + "<DataSet timestep=\"1\" " + part + "file=\"restarted.vtu\"/>\n"),
+            "both.pvd: names the same mesh twice for one time, as a.vtu and as restarted.vtu");
+  refuses("both.vtm", blocks_of({"a.vtu", "restarted.vtu"}), "names the same mesh twice");
 }
 
-TEST(VtkCollection, OfASeriesOfFilesEachIsAStep) {
-  const TemporaryFolder folder;
+TEST_F(VtkCollection, OfASeriesOfFilesEachIsAStep) {
   const auto file_series = [](const std::string& files) {
     return "{\n  \"file-series-version\" : \"1.0\",\n  \"files\" : [" + files + "]\n}\n";
   };
-  for (int i = 1; i <= 3; ++i) write_xml(*bar(0, i), folder / (std::to_string(i) + ".vtu"));
-  const std::filesystem::path file = folder / "a.vtu.series";
+  for (int i = 1; i <= 3; ++i) write_xml(*bar(0, i), folder_ / (std::to_string(i) + ".vtu"));
+  const std::filesystem::path file = folder_ / "a.vtu.series";
   write_bytes(file, file_series(R"({"name": "3.vtu", "time": 1.5}, {"name": "1.vtu", "time": -1},
                                    {"name": "./2.vtu", "time": 1})"));
   EXPECT_EQ(time_steps(file), 3);
   for (const int step : {0, 1, 2}) EXPECT_EQ(read_vtk_source(file, step)->GetNumberOfCells(), step + 1);
   EXPECT_EQ(read_vtk_source(file)->GetNumberOfCells(), 3);
-  for (const auto& [text, error] : {std::pair(file_series(""), "names no files"),
-                                    {file_series(R"({"time": 1})"), "names no files"},
-                                    {file_series(R"({"name": "4.vtu"})"), "4.vtu: does not exist"},
-                                    {file_series(R"({"name": "a.vtu.series"})"), "names the collection"},
-                                    {std::string("[1, 2"), "is not a series of files"}}) {
-    write_bytes(file, text);
-    EXPECT_THAT(read_error(file), HasSubstr(error));
-  }
+  for (const char* none : {"", R"({"time": 1})"}) refuses("a.vtu.series", file_series(none), "names no files");
+  refuses("a.vtu.series", file_series(R"({"name": "4.vtu"})"), "4.vtu: does not exist");
+  refuses("a.vtu.series", file_series(R"({"name": "a.vtu.series"})"), "names the collection");
+  refuses("a.vtu.series", "[1, 2", "is not a series of files");
 }
 
-TEST(VtkCollection, ErrorsNameTheFile) {
-  const TemporaryFolder folder;
-  write_xml(*bar(0, 1), folder / "a.vtu");
-  const auto refuses = [&](const char* name, const std::string& text, const std::string& file, const char* part) {
-    write_bytes(folder / name, text);
-    EXPECT_THAT(read_error(folder / name), AllOf(HasSubstr(file), HasSubstr(part)));
-  };
-  refuses("a.vtm", blocks_of({"none.vtu"}), "none.vtu", "does not exist");
-  refuses("a.vtm", blocks_of({"wall.vtp"}), "a.vtm", "names no file of a volume");
-  refuses("a.vtm", blocks_of({"a.vtm"}), "a.vtm", "names the collection");
-  refuses("a.pvd", series("<DataSet timestep=\"0\" file=\"a.pvd\"/>"), "a.pvd", "names the collection");
-  refuses("a.pvd", series("<DataSet timestep=\"late\" file=\"a.vtu\"/>"), "a.pvd", "'late' is not a number");
-  refuses("a.pvd", blocks_of({"a.vtu"}), "a.pvd", "give it the ending .vtm");
-  refuses("a.pvd", series("<DataSet file=\"a.vtu\"/>").substr(0, 80), "a.pvd", "cut off");
-  refuses("a.pvd", "<VTKFile type=\"Collection\"><Collection></VTKFile>", "a.pvd", "a.pvd");
-  refuses("a.xdmf", "<Xdmf></Xdmf>", "a.xdmf", "has no grid");
+TEST_F(VtkCollection, ErrorsNameTheFile) {
+  write_xml(*bar(0, 1), folder_ / "a.vtu");
+  refuses("a.vtm", blocks_of({"none.vtu"}), "none.vtu: does not exist");
+  refuses("a.vtm", blocks_of({"wall.vtp"}), "a.vtm: names no file of a volume");
+  refuses("a.vtm", blocks_of({"a.vtm"}), "a.vtm: names the collection");
+  refuses("a.pvd", series("<DataSet timestep=\"0\" file=\"a.pvd\"/>"), "a.pvd: names the collection");
+  refuses("a.pvd", series("<DataSet timestep=\"late\" file=\"a.vtu\"/>"), "a.pvd: its time 'late' is not a number");
+  refuses(
+      "a.pvd", blocks_of({"a.vtu"}),
+      "a.pvd: its ending says a ParaView collection, its contents are a VTK multi-block file; give it the ending .vtm");
+  refuses("a.pvd", series("<DataSet file=\"a.vtu\"/>").substr(0, 80), "a.pvd: is cut off");
+  refuses("a.pvd", "<VTKFile type=\"Collection\"><Collection></VTKFile>", "a.pvd: ");
+  refuses("a.xdmf", "<Xdmf></Xdmf>", "a.xdmf: has no grid");
 }
 
 // Blocks that overlap, and copies of other pieces' cells and points: what counts at a voxel.
