@@ -8,9 +8,7 @@
 
 #include "base/text/byte_order.h"
 #include "tests/import/hdf5_writer.h"
-#include "tests/import/mesh_files.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
 namespace {

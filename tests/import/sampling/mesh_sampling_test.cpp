@@ -56,35 +56,25 @@ TEST(MeshSampling, QuadraticCellsGiveAQuadraticFieldExactly) {
 TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
   const auto mesh = with_field(
       unit_cube(VTK_HEXAHEDRON, 4, [](const Vector3d& p) { return Vector3d(2 * p.x() + 1, p.y(), p.z() / 2); }));
-  const Sampled longest = sampled(*mesh, resolution(21));
-  EXPECT_EQ(longest.report.size, Vector3i(21, 11, 6));
-  EXPECT_NEAR(longest.report.voxel.x(), 0.1, 1e-12);
-  EXPECT_TRUE(longest.grid.to_world.translation().isApprox(Vector3d(1, 0, 0)));
-  expect_linear(longest.grid);
-
-  const Sampled each = sampled(*mesh, resolution(Vector3i(5, 6, 7)));
-  EXPECT_EQ(each.report.size, Vector3i(5, 6, 7));
-  EXPECT_TRUE(each.report.voxel.isApprox(Vector3d(0.5, 0.2, 0.5 / 6)));
-  EXPECT_EQ(each.report.active, 5u * 6u * 7u);
-  expect_linear(each.grid);
-
-  // A voxel of another size than the body's parts becomes smaller: the field has the faces, and no more.
-  for (const auto& [voxel, size] :
-       {std::pair(0.3, Vector3i(8, 5, 3)), {0.667, Vector3i(4, 3, 2)}, {2.0, Vector3i(2, 2, 2)}}) {
-    const auto [grid, report] = sampled(*mesh, resolution(voxel));
+  const auto check = [&](const SamplingSettings& settings, const Vector3i& size, const Vector3d& voxel) {
+    SCOPED_TRACE(size.transpose());
+    const auto [grid, report] = sampled(*mesh, settings);
     EXPECT_EQ(report.size, size);
+    EXPECT_TRUE(report.voxel.isApprox(voxel, 1e-12)) << report.voxel;
     EXPECT_EQ(report.active, static_cast<std::size_t>(size.prod()));
-    EXPECT_LE(report.voxel.maxCoeff(), 1.01 * voxel);
     EXPECT_TRUE((grid.to_world * Vector3d::Zero()).isApprox(Vector3d(1, 0, 0), 1e-12));
     EXPECT_TRUE((grid.to_world * (size - Vector3i::Ones()).cast<double>()).isApprox(Vector3d(3, 1, 0.5), 1e-12));
     EXPECT_NEAR(report.volume, 1, 1e-12);
     expect_linear(grid);
-  }
-
+  };
+  check(resolution(21), {21, 11, 6}, {0.1, 0.1, 0.1});
+  check(resolution(Vector3i(5, 6, 7)), {5, 6, 7}, {0.5, 0.2, 0.5 / 6});
+  // A voxel of another size than the body's parts becomes smaller: the field has the faces, and no more.
+  check(resolution(0.3), {8, 5, 3}, {2.0 / 7, 0.25, 0.25});
+  check(resolution(0.667), {4, 3, 2}, {2.0 / 3, 0.5, 0.5});
+  check(resolution(2.0), {2, 2, 2}, {2, 1, 0.5});
   // The cells are 1/2 x 1/4 x 1/8: a cube of the same volume has an edge of 1/4.
-  const SamplingReport chosen = sampled(*mesh).report;
-  EXPECT_TRUE(chosen.voxel.isApprox(Vector3d(0.25, 0.25, 0.125), 1e-9));
-  EXPECT_EQ(chosen.size, Vector3i(9, 5, 5));
+  check({}, {9, 5, 5}, {0.25, 0.25, 0.125});
 }
 
 // Without options, voxels are on the faces of a thin body, and there are four cells of them across it wherever it lies.
