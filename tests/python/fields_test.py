@@ -194,10 +194,6 @@ class RaysTest(unittest.TestCase):
                 tr.trace(field, [0, 0, 0], [0, 0, 1], 1, **options)
 
 
-def stop(*_):
-    raise LookupError("enough")
-
-
 class PackageTest(unittest.TestCase):
     def test_the_version_is_that_of_the_program(self):
         ended = subprocess.run([os.environ["TENSORRAY_BINARY"], "--version"], capture_output=True, text=True)
@@ -221,7 +217,10 @@ class PackageTest(unittest.TestCase):
         self.assertTrue(names["rays"].landed.any())
 
     def test_imports(self):
-        tensors = np.random.default_rng(1).normal(size=(4, 5, 6, 3, 3)).astype("f4")
+        def stop(*_):
+            raise LookupError("enough")
+
+        tensors = random_tensors((4, 5, 6))
         with tempfile.TemporaryDirectory() as folder:
             file = os.path.join(folder, "t.npy")
             np.save(file, tensors.reshape(4, 5, 6, 9))

@@ -22,11 +22,11 @@ class Frames : public Program {
 TEST_F(Frames, KeyframesAndNumberedFieldsAreFollowed) {
   write("scene.json", R"({"field": {"file": "load.####.vdb", "scale": 2})" + rest_);
   run_well({"render", "scene.json", "--frames", "1-3x2", "-o", "out.##.exr", "--stats", "out.##.json", "-q"});
-  for (const char* frame : {"1", "3"}) {
-    const std::string number(frame), direction = number == "1" ? "[0,0,-1]" : "[0,1,-1]";
+  for (const std::string number : {"1", "3"}) {
+    const std::string direction = number == "1" ? "[0,0,-1]" : "[0,1,-1]";
     run_well(joined({"render", "scene.json", "-o", "alone.exr", "-q"},
                     changes({"light.direction=" + direction, "field.file=load.000" + number + ".vdb"})));
-    EXPECT_EQ(pixels("out.0" + number + ".exr"), pixels("alone.exr")) << frame;
+    EXPECT_EQ(pixels("out.0" + number + ".exr"), pixels("alone.exr")) << number;
     EXPECT_TRUE(has("out.0" + number + ".json"));
   }
   EXPECT_FALSE(has("out.02.exr"));

@@ -80,8 +80,11 @@ class KeptWork : public Program {
   }
 
   void make_shards(int count) const {
-    for (int i = 1; i <= count; ++i)
-      run_well({"render", "scene.json", "-q", "--shard", fmt::format("{}/{}", i, count), "-o", shard(i)});
+    for (int i = 1; i <= count; ++i) run_well(render_shard(i, count));
+  }
+
+  static Arguments render_shard(int i, int count, const Arguments& more = {}) {
+    return joined({"render", "scene.json", "-q", "--shard", fmt::format("{}/{}", i, count), "-o", shard(i)}, more);
   }
 
   static std::string shard(int i) { return fmt::format("{}.shard", i); }
@@ -126,8 +129,7 @@ TEST_F(KeptWork, AShardThatIsKilledContinues) {
   make(lit_scene);
   make_shards(2);
   const std::string whole = contents(shard(2));
-  const Arguments part{"render", "scene.json",   "-q",   "--shard",   "2/2", "-o",
-                       shard(2), "--checkpoint", "0.01", "--threads", "1"};
+  const Arguments part = render_shard(2, 2, {"--checkpoint", "0.01", "--threads", "1"});
   std::filesystem::remove(in_folder(shard(2)));
   EXPECT_EQ(end_by(SIGKILL, shard(2) + ".checkpoint", part).status, 128 + SIGKILL);
   run_well(joined(part, {"--resume"}));
@@ -138,9 +140,7 @@ TEST_F(KeptWork, AShardThatIsKilledContinues) {
 TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
   make(lit_scene);
   const auto make_shard = [](int i, const Arguments& more) {
-    return joined(
-        {"render", "scene.json", "-q", "--checkpoint", "0.01", "--shard", fmt::format("{}/3", i), "-o", shard(i)},
-        more);
+    return render_shard(i, 3, joined({"--checkpoint", "0.01"}, more));
   };
   run_well(make_shard(1, {}));
   run_well(make_shard(2, {"--light", shard(1)}));
@@ -242,14 +242,14 @@ TEST_F(KeptWork, ShardsThatDoNotFitAreNamed) {
   make_shards(3);
   expect_error("missing shard 2/3", merge({"1.shard", "3.shard"}));
   expect_error("3.shard and 3.shard are both shard 3/3", merge({"1.shard", "2.shard", "3.shard", "3.shard"}));
-  run_well({"render", "scene.json", "-q", "--shard", "2/3", "-o", "2.shard", "--seed", "3"});
+  run_well(render_shard(2, 3, {"--seed", "3"}));
   expect_error("2.shard: is of another render than the first shard: `/seed`", merge({"1.shard", "2.shard", "3.shard"}));
-  run_well({"render", "scene.json", "-q", "--shard", "2/4", "-o", "2.shard"});
+  run_well(render_shard(2, 4));
   expect_error("2.shard: is one of 4 shards", merge({"1.shard", "2.shard", "3.shard"}));
   expect_error("scene.json: is no checkpoint or shard", merge({"scene.json"}), 1);
-  expect_error("--shard 4/3", {"render", "scene.json", "--shard", "4/3", "-o", "2.shard"});
+  expect_error("--shard 4/3", render_shard(4, 3));
   expect_error("--shard: name one file", render("a", {"--shard", "1/3"}));
-  run_well({"render", "scene.json", "-q", "--shard", "2/3", "-o", "2.shard"});
+  run_well(render_shard(2, 3));
   run_well(merge({"1.shard", "2.shard", "3.shard"}));
   expect_same("a");
 }

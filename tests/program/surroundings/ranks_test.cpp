@@ -39,18 +39,15 @@ class RanksProgram : public Program {
 
   void expect_same(const std::string& a, const std::string& b) const { EXPECT_TRUE(is_equal(a, b)) << a << ", " << b; }
 
-  /// The process that is a rank of mpirun's process; none if it has not begun.
-  static std::optional<pid_t> process_of(pid_t parent, int rank) {
+  /// The process of a rank, which works in the test's folder; none if it has not begun.
+  std::optional<pid_t> process_of(int rank) const {
+    const std::filesystem::path here = std::filesystem::canonical(in_folder(""));
     const std::string name = fmt::format("OMPI_COMM_WORLD_RANK={}", rank) + '\0';
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator("/proc", error)) {
-      const std::string number = entry.path().filename().string();
-      if (number.find_first_not_of("0123456789") != std::string::npos) continue;
-      const std::string stat = bytes_of(entry.path() / "stat");
-      const std::size_t end = stat.rfind(')');
-      if (end == std::string::npos || end + 4 >= stat.size() || std::atoi(stat.c_str() + end + 4) != parent) continue;
-      if (bytes_of(entry.path() / "environ").find(name) != std::string::npos) return std::atoi(number.c_str());
-    }
+    std::error_code none;
+    for (const auto& process : std::filesystem::directory_iterator("/proc", none))
+      if (std::filesystem::read_symlink(process.path() / "cwd", none) == here &&
+          bytes_of(process.path() / "environ").find(name) != std::string::npos)
+        return std::stoi(process.path().filename().string());
     return std::nullopt;
   }
 };
@@ -112,7 +109,7 @@ TEST_F(RanksProgram, AKilledRankEndsTheJobWhichContinuesToTheSameFiles) {
     const pid_t job = start_ranks(
         2, {"-q", "-o", "a.png", "-o", "a.exr", "--threads", "1", "--checkpoint", "0.01", "--stats", "pipe"});
     while (!has("a.png.checkpoint") && is_running(job)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    const std::optional<pid_t> process = process_of(job, rank);
+    const std::optional<pid_t> process = process_of(rank);
     ASSERT_TRUE(process) << contents("stderr");
     kill(*process, SIGKILL);
     const Outcome outcome = wait_for(job);
