@@ -24,7 +24,6 @@
 #include "scenes/jobs/work_file.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/source/overrides.h"
-#include "tests/fuzz/view_targets.h"
 #include "tools/import/cases/case_files.h"
 #include "tools/import/hdf5/xdmf_document.h"
 #include "tools/import/lattice_files/lattice_files.h"
@@ -69,8 +68,8 @@ std::filesystem::path named(const std::filesystem::path& path, const std::string
   return link;
 }
 
-/// A target of the bytes of a file.
-template <void (*read)(const std::filesystem::path&)>
+/// A target of the bytes of a file, which a function of its path reads.
+template <auto read>
 bool of_file(const std::string& bytes) {
   const MemoryFile file(bytes);
   return expect_one_line([&] { read(file.path()); });
@@ -96,15 +95,12 @@ bool read_frames(const std::string& bytes) {
   return expect_one_line([&] { parse_frames(bytes); });
 }
 
-void read_seed_file(const Path& path) { read_seeds(path); }
 void read_spectrum_file(const Path& path) { read_spectrum(path); }
 
 bool read_seeds_and_spectrum(const std::string& bytes) {
-  const bool are_seeds = of_file<read_seed_file>(bytes);
+  const bool are_seeds = of_file<read_seeds>(bytes);
   return of_file<read_spectrum_file>(bytes) || are_seeds;
 }
-
-void read_kept_work(const Path& path) { read_work(path); }
 
 /// What files of work hold: the sums of photons, or other results. Their first byte chooses. (Few of the bytes that a
 /// fuzzer makes of such a file have the right hash.)
@@ -125,7 +121,9 @@ bool read_kept_unit(const std::string& bytes) {
 }
 
 /// Each vertex has a normal or none has, and triangles name vertices that are there.
-void require_whole(const MeshWithNormals& mesh) {
+template <MeshWithNormals (*read)(const Path&)>
+void read_mesh(const Path& path) {
+  const MeshWithNormals mesh = read(path);
   const std::size_t count = mesh.mesh.vertices.size();
   if (!mesh.normals.empty() && mesh.normals.size() != count) throw std::logic_error("normals are missing");
   for (const auto& triangle : mesh.mesh.triangles)
@@ -133,17 +131,11 @@ void require_whole(const MeshWithNormals& mesh) {
       if (vertex >= count) throw std::logic_error("a vertex is missing");
 }
 
-void read_ply_mesh(const Path& path) { require_whole(read_ply(path)); }
-void read_obj_mesh(const Path& path) { require_whole(read_obj(path)); }
-
 /// For grey pictures, too.
 bool read_profile(const std::string& bytes) {
   const bool is_grey = expect_one_line([&] { icc_to_xyz(bytes, true); });
   return expect_one_line([&] { icc_to_xyz(bytes, false); }) || is_grey;
 }
-
-void read_png(const Path& path) { read_png_chunks(path); }
-void read_tck(const Path& path) { read_tck_paths(path); }
 
 /// The values of all slices, too.
 void read_slices(const Lattice& lattice) {
@@ -198,13 +190,13 @@ const std::vector<FuzzTarget>& fuzz_targets() {
                                                {"override", read_overrides},
                                                {"frames", read_frames},
                                                {"text", read_seeds_and_spectrum},
-                                               {"work", of_file<read_kept_work>},
+                                               {"work", of_file<read_work>},
                                                {"kept", read_kept_unit},
-                                               {"ply", of_file<read_ply_mesh>},
-                                               {"obj", of_file<read_obj_mesh>},
+                                               {"ply", of_file<read_mesh<read_ply>>},
+                                               {"obj", of_file<read_mesh<read_obj>>},
                                                {"icc", read_profile},
-                                               {"png", of_file<read_png>},
-                                               {"tck", of_file<read_tck>},
+                                               {"png", of_file<read_png_chunks>},
+                                               {"tck", of_file<read_tck_paths>},
                                                {"npy", of_file<read_lattice<open_npy>>},
                                                {"nrrd", of_file<read_lattice<open_nrrd>>},
                                                {"nifti", of_file<read_nifti>},

@@ -1,14 +1,13 @@
-#include "tests/fuzz/view_targets.h"
-
-#include <condition_variable>
+#include <algorithm>
 #include <memory>
-#include <mutex>
+#include <regex>
 #include <stdexcept>
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
 
+#include "tests/fuzz/targets.h"
 #include "tests/viewer/view_support.h"
 
 namespace tensorray::test {
@@ -19,18 +18,10 @@ using tcp = asio::ip::tcp;
 
 /// A server of a small scene, until the program ends.
 RunningView& view() {
-  static RunningView only([] {
-    ServerSettings settings;
-    settings.token = "secret";
-    return settings;
-  }());
+  ServerSettings settings;
+  settings.token = "secret";
+  static RunningView only(settings);
   return only;
-}
-
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
-    text.replace(at, what.size(), by);
-  return text;
 }
 
 }  // namespace
@@ -46,7 +37,7 @@ bool read_http(const std::string& bytes) {
   boost::system::error_code ignored;  // The server may end the connection at any time.
   socket.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(std::stoi(port))}, ignored);
   if (ignored) return false;  // The fuzzer's clock has interrupted it.
-  asio::write(socket, asio::buffer(replaced(bytes, "PORT", port)), ignored);
+  asio::write(socket, asio::buffer(std::regex_replace(bytes, std::regex("PORT"), port)), ignored);
   socket.shutdown(tcp::socket::shutdown_send, ignored);
   std::string answer;
   asio::read(socket, asio::dynamic_buffer(answer), ignored);
@@ -57,28 +48,15 @@ bool read_http(const std::string& bytes) {
 }
 
 bool read_page_message(const std::string& bytes) {
-  struct Answer {
-    std::mutex mutex;
-    std::condition_variable arrived;
-    bool is_there = false, has_error = false;
-  };
-  const auto answer = std::make_shared<Answer>();  // A message may come after the page was closed.
-  const Pages::Id id = view().pages().open([answer](const PageMessage& message) {
-    const std::lock_guard<std::mutex> lock(answer->mutex);
-    const Json json = received(message).json;
-    answer->is_there |= json.value("id", Json()) == "the last message";
-    answer->has_error |= json.value("type", Json()) == "error";
-    answer->arrived.notify_all();
-  });
+  const auto mailbox = std::make_shared<Mailbox>();  // A message may come after the page was closed.
+  const Pages::Id id = view().pages().open([mailbox](const PageMessage& message) { mailbox->sender()(message); });
   view().pages().receive(id, bytes);
   view().pages().receive(id, R"({"type": "space", "id": "the last message"})");
-  {
-    std::unique_lock<std::mutex> lock(answer->mutex);
-    answer->arrived.wait(lock, [&] { return answer->is_there; });
-  }
+  mailbox->wait([](const Json& json) { return json.value("id", Json()) == "the last message"; });
   view().pages().close(id);
-  const std::lock_guard<std::mutex> lock(answer->mutex);
-  return !answer->has_error;
+  const std::vector<Received> all = mailbox->all();
+  return std::none_of(all.begin(), all.end(),
+                      [](const Received& each) { return each.json.value("type", Json()) == "error"; });
 }
 
 }  // namespace tensorray::test

@@ -12,7 +12,10 @@ namespace fs = std::filesystem;
 
 class Install : public testing::Test {
  protected:
-  void SetUp() override { fs::create_directories(folder_); }
+  void SetUp() override {
+    fs::create_directories(folder_);
+    install("programs");
+  }
 
   /// Runs a command of the shell in the test's folder, with `prefix` as the variable of that name.
   void run(const std::string& command) const {
@@ -31,7 +34,6 @@ class Install : public testing::Test {
 };
 
 TEST_F(Install, ProgramsRun) {
-  install("programs");
   const std::string scene = (test::source_folder() / "scenes" / "constant.json").string();
   run("\"$prefix/bin/tensorray\" render '" + scene +
       "' --set light.photons=1000 -q -o a.png -o a.vtp && test -s a.png");
@@ -39,7 +41,6 @@ TEST_F(Install, ProgramsRun) {
 }
 
 TEST_F(Install, AProjectFindsTheLibrary) {
-  install("programs");
   install("development");
   const std::string project = (test::source_folder() / "tests" / "install" / "example").string();
   run("cmake -S '" + project +
@@ -53,7 +54,6 @@ TEST_F(Install, AProjectFindsTheLibrary) {
 TEST_F(Install, PythonFindsThePackage) {
   if (std::system("'" TENSORRAY_PYTHON_PROGRAM "' -c 'import numpy' 2>/dev/null") != 0)
     GTEST_SKIP() << "NumPy is not installed";
-  install("programs");
   install("python");
   run("PYTHONPATH=\"$prefix/" TENSORRAY_PYTHON_FOLDER "\" PYTHONDONTWRITEBYTECODE=1 '" TENSORRAY_PYTHON_PROGRAM
       "' -c \"import tensorray as tr; assert tr.__file__.startswith('$prefix'); "
@@ -65,7 +65,6 @@ bool has(const std::string& program) { return std::system(("command -v " + progr
 
 TEST_F(Install, ManualPagesAreRead) {
   if (!has("man")) GTEST_SKIP() << "man is not installed";
-  install("programs");
   for (const char* page : {"tensorray", "tensorray-render", "tensorray-import", "tensorray-view", "tensorray-make"}) {
     const std::string file = "\"$prefix/share/man/man1/" + std::string(page) + ".1\"";
     run("man --warnings -l " + file + " >page.txt 2>warnings.txt && test -s page.txt && ! test -s warnings.txt");
@@ -74,7 +73,6 @@ TEST_F(Install, ManualPagesAreRead) {
 }
 
 TEST_F(Install, ShellsComplete) {
-  install("programs");
   const std::string words = "$prefix/share/";
   const std::string bash =
       "source \"$0\"; COMP_CWORD=$(($# - 1)); COMP_WORDS=(\"$@\"); _tensorray; echo \"${COMPREPLY[@]}\"";

@@ -12,8 +12,6 @@
 
 namespace tensorray::test {
 
-using nlohmann::json;
-
 template <class Number>
 inline std::string bytes_of(const std::vector<Number>& numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
@@ -29,17 +27,15 @@ class Import : public Program {
 
   /// Expects `status`, one line that contains `parts`, and that all files stay unchanged, also an older output.
   void refuses(const Arguments& arguments, int status, const std::vector<std::string>& parts) const {
-    write("old.vdb", " BDV, which was there before");
+    const std::string old = " BDV, which was there before";
+    write("old.vdb", old);
     const auto before = files();
     const Outcome outcome = run(joined({"import", "-q", "-o", "old.vdb"}, arguments));
-    const std::string trace = fmt::format("{}: {}", fmt::join(arguments, " "), outcome.error);
-    EXPECT_EQ(outcome.status, status) << trace;
-    EXPECT_EQ(outcome.out, "") << trace;
-    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << trace;
-    for (const std::string& part : parts)
-      EXPECT_NE(outcome.error.find(part), std::string::npos) << part << "\n" << trace;
-    EXPECT_EQ(files(), before) << trace;
-    EXPECT_TRUE(read_file(in_folder("old.vdb")) == " BDV, which was there before") << trace;
+    SCOPED_TRACE(fmt::format("{}: {}", fmt::join(arguments, " "), outcome.error));
+    for (const std::string& part : parts) expect_one_line(outcome, part, status);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(files(), before);
+    EXPECT_EQ(contents("old.vdb"), old);
   }
 
   Outcome imported_;  ///< Result of the last import.

@@ -54,13 +54,15 @@ class LongCallsTest(unittest.TestCase):
     def test_other_threads_run_meanwhile(self):
         def count():
             for _ in range(10):
-                time.sleep(0.001)
+                time.sleep(0.01)
             signal.raise_signal(signal.SIGINT)
 
         field, thread = tr.make("vortex", resolution=24), threading.Thread(target=count)
-        with self.assertRaises(KeyboardInterrupt):
-            thread.start()
-            tr.render(LONG, field=field)
+        with tempfile.TemporaryDirectory() as folder:
+            with self.assertRaises(KeyboardInterrupt):
+                thread.start()
+                tr.render(LONG, field=field, outputs=os.path.join(folder, "a.exr"))
+            self.assertEqual(os.listdir(folder), [])
         thread.join()
 
     def test_a_daemon_that_works_does_not_end_the_process_badly(self):
@@ -112,19 +114,6 @@ class LongCallsTest(unittest.TestCase):
             self.assertEqual(ended.returncode, 0, ended.stderr)
             self.assertEqual("%" in ended.stderr, is_shown)
             self.assertEqual(ended.stderr != "", is_shown)
-
-    def test_interrupts(self):
-        with tempfile.TemporaryDirectory() as folder:
-            program = ("import tensorray as tr\n"
-                       f"tr.render({LONG}, field=tr.make('vortex', resolution=24), outputs='a.exr',\n"
-                       "          progress=lambda *report: print('working', flush=True))\n")
-            child = subprocess.Popen([sys.executable, "-c", program], cwd=folder, stdout=subprocess.PIPE,
-                                     stderr=subprocess.PIPE, text=True)
-            self.assertEqual(child.stdout.readline(), "working\n")
-            child.send_signal(signal.SIGINT)
-            _, error = child.communicate()
-            self.assertEqual(error.strip().splitlines()[-1], "KeyboardInterrupt")
-            self.assertEqual(os.listdir(folder), [])
 
 
 if __name__ == "__main__":

@@ -12,12 +12,8 @@ import numpy as np
 import tensorray as tr
 
 FIELD = {"generate": {"kind": "point_load", "resolution": 17}}
-PHOTONS = {
-    "field": FIELD,
-    "light": {"photons": 2000, "wavelengths": {"count": 4}},
-    "receiver": {"resolution": [40, 32]},
-    "integrator": {"type": "photon_distribution"},
-}
+PHOTONS = {"field": FIELD, "light": {"photons": 2000, "wavelengths": {"count": 4}},
+           "receiver": {"resolution": [40, 32]}, "integrator": {"type": "photon_distribution"}}
 OTHERS = {
     "lens": {"field": FIELD, "receiver": {"resolution": [24, 24]}, "integrator": {"type": "lens"}},
     "path_tracing": {"field": FIELD, "camera": {"resolution": [24, 24]},

@@ -4,7 +4,6 @@
 #include <cctype>
 #include <cstdlib>
 #include <fstream>
-#include <istream>
 #include <iterator>
 #include <map>
 #include <regex>
@@ -18,7 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The lines of a page without blocks of code: those between fences, and those that are indented after an empty line.
-std::vector<std::string> prose_of(std::istream& page) {
+std::vector<std::string> prose_of(const fs::path& file) {
+  std::ifstream page(file);
   std::vector<std::string> lines;
   bool is_fenced = false, may_begin_code = true;
   for (std::string line; std::getline(page, line);) {
@@ -44,7 +44,7 @@ std::string anchor_of(const std::string& heading) {
 }
 
 /// The anchors of a page: of equal ones, the second ends in -1, and so on.
-std::set<std::string> anchors_in(std::istream& page) {
+std::set<std::string> anchors_in(const fs::path& page) {
   static const std::regex heading("#{1,6} +(.*)");
   std::map<std::string, int> counts;
   std::set<std::string> anchors;
@@ -59,7 +59,7 @@ std::set<std::string> anchors_in(std::istream& page) {
 }
 
 /// Where the links and the pictures of a page lead, without those that are within code.
-std::vector<std::string> targets_in(std::istream& page) {
+std::vector<std::string> targets_in(const fs::path& page) {
   static const std::regex target(R"(\]\(([^()\s]+)\)|<(?:img|a) (?:src|href)="([^"]*)\")");
   std::string text;
   bool is_code = false;
@@ -85,16 +85,14 @@ std::string fault_of(const fs::path& page, const std::string& target) {
   if (fs::relative(file, test::source_folder()).string().rfind("..", 0) == 0) return "leads out of the project";
   if (!fs::exists(file)) return "does not exist";
   if (hash == std::string::npos) return "";
-  std::ifstream stream(file);
-  return anchors_in(stream).count(target.substr(hash + 1)) ? "" : "no heading has this anchor";
+  return anchors_in(file).count(target.substr(hash + 1)) ? "" : "no heading has this anchor";
 }
 
 TEST(Links, LeadSomewhere) {
   std::size_t count = 0;
   for (const fs::path& page : test::files_of_project()) {
     if (page.extension() != ".md") continue;
-    std::ifstream stream(page);
-    for (const std::string& target : targets_in(stream)) {
+    for (const std::string& target : targets_in(page)) {
       EXPECT_EQ(fault_of(page, target), "") << fs::relative(page, test::source_folder()).string() << ": " << target;
       ++count;
     }
@@ -104,9 +102,9 @@ TEST(Links, LeadSomewhere) {
 
 /// Otherwise only a search finds it.
 TEST(Links, LeadFromTheReadmeToEachPageForUsers) {
-  std::ifstream stream(test::source_folder() / "README.md");
   std::set<fs::path> linked;
-  for (const std::string& target : targets_in(stream)) linked.insert(fs::path(target.substr(0, target.find('#'))));
+  for (const std::string& target : targets_in(test::source_folder() / "README.md"))
+    linked.insert(fs::path(target.substr(0, target.find('#'))));
   for (const char* folder : {"docs", "docs/tutorials"})
     for (const auto& entry : fs::directory_iterator(test::source_folder() / folder))
       if (entry.path().extension() == ".md") {

@@ -2,7 +2,6 @@
 /// The files of the project, and its sources as lines of text, for tests of rules about them.
 
 #include <fstream>
-#include <set>
 
 #include "tests/data_folder.h"
 #include "tests/files.h"
@@ -15,7 +14,6 @@ struct Line {
 
   std::string folder() const { return std::filesystem::path(file).parent_path().string(); }
   bool is_under(const std::string& parent) const { return file.rfind(parent + "/", 0) == 0; }
-  bool is_of_header() const { return std::filesystem::path(file).extension() == ".h"; }
 };
 
 /// All files of the project, and none that a build has made.
@@ -30,26 +28,17 @@ inline std::vector<std::filesystem::path> files_of_project() {
   return files;
 }
 
-/// The folders with C++ in the source folder. Each has a CMakeLists.txt. The folder tests is not among them.
-inline std::set<std::string> top_folders() {
-  std::set<std::string> folders;
-  for (const auto& entry : std::filesystem::directory_iterator(source_folder()))
-    if (std::filesystem::exists(entry.path() / "CMakeLists.txt")) folders.insert(entry.path().filename().string());
-  folders.erase("tests");
-  return folders;
-}
-
-/// All lines of the headers and sources in a folder and in the folders below it.
-inline std::vector<Line> lines_of(const std::string& folder) {
+/// All lines of the headers and sources in the folders with a CMakeLists.txt of the source folder, but for the tests.
+inline std::vector<Line> all_lines() {
   std::vector<Line> lines;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(source_folder() / folder)) {
-    const std::string ending = entry.path().extension().string();
-    if (ending != ".h" && ending != ".cpp") continue;
-    std::ifstream file(entry.path());
-    const std::string name = std::filesystem::relative(entry.path(), source_folder()).string();
-    for (std::string text; std::getline(file, text);) lines.push_back({name, text});
+  for (const std::filesystem::path& path : files_of_project()) {
+    const std::filesystem::path name = path.lexically_relative(source_folder()), top = *name.begin();
+    const bool is_source = name.extension() == ".h" || name.extension() == ".cpp";
+    if (!is_source || top == "tests" || !std::filesystem::exists(source_folder() / top / "CMakeLists.txt")) continue;
+    std::ifstream file(path);
+    for (std::string text; std::getline(file, text);) lines.push_back({name.string(), text});
   }
-  EXPECT_FALSE(lines.empty()) << "no sources in " << folder;
+  EXPECT_FALSE(lines.empty());
   return lines;
 }
 

@@ -1,8 +1,7 @@
 // An import that fails prints one line and changes no file.
 
 #include <cstdlib>
-
-#include <sys/stat.h>
+#include <fstream>
 
 #include "tests/program/import_support.h"
 
@@ -22,7 +21,7 @@ TEST_F(ImportErrors, FilesThatAreCutOffOrMissingOrSomethingElse) {
   refuses({"missing.vti"}, 1, {"missing.vti", "does not exist"});
   refuses({"half.vti", "missing.q"}, 1, {"missing.q", "does not exist"});
   for (const char* pipe : {"pipe.vti", "pipe.npy", "pipe.vdb"}) {
-    ASSERT_EQ(mkfifo(in_folder(pipe).c_str(), 0600), 0);
+    make_pipe(pipe);
     refuses({pipe}, 1, {pipe, "is a pipe or a device"});
   }
   std::filesystem::create_directory(in_folder("folder"));
@@ -35,11 +34,9 @@ TEST_F(ImportErrors, OutputsThatAreInputsByALink) {
     std::filesystem::create_symlink(in_folder("field.vti"), in_folder(link));
   refuses({"field.vti", "--boundary", "link.ply"}, 2,
           {"--boundary", "link.ply", "the same file as the file to import"});
-  const auto before = files();
   expect_error("-o (link.vdb) is the same file as the file to import", {"import", "field.vti", "-q", "-o", "link.vdb"},
                2);
-  EXPECT_EQ(read_file(in_folder("field.vti")), image());
-  EXPECT_EQ(files(), before);
+  EXPECT_EQ(contents("field.vti"), image());
 }
 
 TEST_F(ImportErrors, WrongArguments) {
@@ -69,6 +66,11 @@ TEST_F(ImportErrors, WrongArguments) {
   refuses({"array.npy", "--resolution", "8"}, 2, {"array.npy", "--resolution"});
   refuses({"array.npy", "--memory", "-1"}, 2, {"--memory"});
   expect_error("missing", {"import", "image.vti", "-q", "-o", "missing/image.vdb"}, 1);
+  // Numbers that OpenVDB refuses, or writes and does not read; and no voxels.
+  refuses({"array.npy", "--voxel-size", "1e150"}, 1, {"array.npy", "1e-30"});
+  refuses({"array.npy", "--origin", "1e20", "0", "0"}, 1, {"array.npy", "origin"});
+  refuses({"image.vti", "--bounds", "50", "60", "50", "60", "50", "60"}, 2, {"--bounds"});
+  refuses({"image.vti", "--resolution", "8", "--bounds", "50", "60", "50", "60", "50", "60"}, 2, {"--bounds"});
 }
 
 /// Options that take one number or three end where a word is none.
@@ -89,24 +91,6 @@ TEST_F(ImportErrors, NamesOfFilesAreNoNumbers) {
   expect_error("missing.json", {"render", "-o", "a.png", "missing.json", "-q"});  // Not as another picture.
 }
 
-/// Numbers that a file or a user may give, and that OpenVDB refuses, or writes and does not read; and no voxels.
-TEST_F(ImportErrors, VoxelsThatAreNowhere) {
-  write("array.npy", array());
-  write("image.vti", image());
-  refuses({"array.npy", "--voxel-size", "1e150"}, 1, {"array.npy", "1e-30"});
-  refuses({"array.npy", "--origin", "1e20", "0", "0"}, 1, {"array.npy", "origin"});
-  refuses({"image.vti", "--bounds", "50", "60", "50", "60", "50", "60"}, 2, {"--bounds"});
-  refuses({"image.vti", "--resolution", "8", "--bounds", "50", "60", "50", "60", "50", "60"}, 2, {"--bounds"});
-}
-
-TEST_F(ImportErrors, AFullDiskLeavesWhatWasThere) {
-  write("array.npy", array());
-  write("old.vdb", " BDV, which was there before");
-  expect_one_line(run_with_blocks(16, {"import", "array.npy", "-q", "-o", "old.vdb"}), "", 1);
-  EXPECT_EQ(read_file(in_folder("old.vdb")), " BDV, which was there before");
-  EXPECT_EQ(files(), (std::vector<std::string>{"array.npy", "old.vdb"}));
-}
-
 TEST_F(ImportErrors, DataThatTheInputNamesAreNotReplaced) {
   const std::string numbers(9 * 8 * sizeof(float), 1);
   write("data.vdb", numbers);
@@ -114,7 +98,7 @@ TEST_F(ImportErrors, DataThatTheInputNamesAreNotReplaced) {
         "NRRD0004\ntype: float\ndimension: 4\nsizes: 9 2 2 2\nkinds: 3D-matrix space space space\nendian: little\n"
         "encoding: raw\ndata file: data.vdb\n");
   expect_error("data.vdb: is there, and is no OpenVDB file", {"import", "a.nhdr", "-o", "data.vdb"}, 2);
-  EXPECT_TRUE(read_file(in_folder("data.vdb")) == numbers);
+  EXPECT_TRUE(contents("data.vdb") == numbers);
   for (int i = 0; i < 2; ++i) run_well({"import", "a.nhdr", "-q", "-o", "b.vdb"});
 }
 
@@ -124,26 +108,22 @@ class ImportProcess : public Import {
  protected:
   /// A file of tensors: `header`, then numbers, then `footer`.
   void write_large(const std::string& name, const std::string& header, const std::string& footer = "") const {
+    std::vector<float> quarter(large_numbers / 4);
+    for (std::size_t i = 0; i < quarter.size(); ++i) quarter[i] = static_cast<float>(i * 2654435761u % 1024);
     std::ofstream file(in_folder(name), std::ios::binary);
     file << header;
-    constexpr int slices = 4;
-    std::vector<float> slice(large_numbers / slices);
-    for (int z = 0; z < slices; ++z) {
-      for (std::size_t i = 0; i < slice.size(); ++i) slice[i] = static_cast<float>((i * 2654435761u + 97u * z) % 1024);
-      file << bytes_of(slice);
-    }
+    for (int i = 0; i < 4; ++i) file << bytes_of(quarter);
     file << footer;
   }
 
   /// The largest resident memory of any process of an import, bytes.
   double peak_bytes(const std::string& file) const {
     // The size that the system tells of a process includes what it was forked from: Python is smaller than this test.
-    const Outcome outcome = wait_for(start_in(R"(exec python3 -c '
+    const Outcome outcome = run({"import", file, "-q", "-o", "field.vdb"}, R"(exec python3 -c '
 import resource, subprocess, sys
 status = subprocess.call(sys.argv[1:], stdout=subprocess.DEVNULL)
 print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
-sys.exit(status)')",
-                                              {"import", file, "-q", "-o", "field.vdb"}));
+sys.exit(status)')");
     EXPECT_EQ(outcome.status, 0) << outcome.error;
     const double kilobytes = std::strtod(outcome.out.c_str(), nullptr);
     EXPECT_GT(kilobytes, 0) << outcome.out;
@@ -221,16 +201,10 @@ TEST_F(ImportProcess, OfWhatIsKeptInFilesGivesTheSameFile) {
 
 class HostileFiles : public Import {
  protected:
-  /// A pipe that nobody writes to: to open it would wait for ever.
-  void make_pipe(const std::string& name) const {
-    std::filesystem::create_directories(in_folder(name).parent_path());
-    ASSERT_EQ(mkfifo(in_folder(name).c_str(), 0600), 0);
-  }
-
   /// Expects an error of one line with the file's name and a part, of a process whose data may take 2 GB: more for the
   /// address sanitizer, which reserves terabytes.
   void refuses_soon(const std::string& name, const std::string& part = "") const {
-    const Outcome outcome = wait_for(start_in(limit_, {"import", "-q", "-o", "f.vdb", name}));
+    const Outcome outcome = run({"import", "-q", "-o", "f.vdb", name}, limit_);
     EXPECT_TRUE(outcome.status == 1 || outcome.status == 2) << name << ": " << outcome.status << outcome.error;
     for (const std::string& each : {name, part}) expect_one_line(outcome, each);
     EXPECT_FALSE(has("f.vdb"));
@@ -244,9 +218,10 @@ class HostileFiles : public Import {
 #endif
 };
 
-std::string xml(const std::string& type, const std::string& contents) {
-  return "<?xml version=\"1.0\"?><VTKFile type=\"" + type +
-         "\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">" + contents + "</VTKFile>";
+std::string xml(const std::string& type, const std::string& inside, const std::string& attributes = "") {
+  return fmt::format(R"(<?xml version="1.0"?><VTKFile type="{0}" version="1.0" byte_order="LittleEndian"
+      header_type="UInt64"><{0}{2}>{1}</{0}></VTKFile>)",
+                     type, inside, attributes);
 }
 
 std::string legacy(const std::string& data_set, const std::string& points) {
@@ -260,56 +235,44 @@ const std::string legacy_mesh = "UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 
 /// is implied, so that what looks at all its points would take days, or that grow when they are read.
 TEST_F(HostileFiles, AreRefusedSoon) {
   make_pipe("pipe");
-  const std::string nrrd = "NRRD0004\ntype: float\ndimension: 4\nsizes: 6 2 2 2\nencoding: raw\nendian: little\n";
-  const std::string huge =
-      "<ImageData WholeExtent=\"0 99999 0 99999 0 99999\" Origin=\"0 0 0\" Spacing=\"1 1 1\">"
-      "<Piece Extent=\"0 99999 0 99999 0 99999\"/></ImageData>";
-  for (const char* name : {"a.vti", "b.vti"}) write(name, xml("ImageData", huge));
-  const std::string grid =
-      "<Grid><Topology TopologyType=\"3DCoRectMesh\" Dimensions=\"100000 100000 100000\"/><Geometry "
-      "GeometryType=\"ORIGIN_DXDYDZ\"><DataItem Dimensions=\"3\">0 0 0</DataItem><DataItem Dimensions=\"3\">1 1 "
-      "1</DataItem></Geometry></Grid>";
-  std::string doubled, nested;
-  for (int i = 0; i < 27; ++i) {
+  const std::string numbers = "NRRD0004\ntype: float\ndimension: 4\nsizes: 6 2 2 2\nencoding: raw\nendian: little\n";
+  for (const char* name : {"a.vti", "b.vti"})
+    write(name, xml("ImageData", R"(<Piece Extent="0 99999 0 99999 0 99999"/>)",
+                    R"( WholeExtent="0 99999 0 99999 0 99999" Origin="0 0 0" Spacing="1 1 1")"));
+  const auto xdmf = [](const std::string& inside) { return "<Xdmf><Domain>" + inside + "</Domain></Xdmf>"; };
+  const std::string grid = R"(<Grid><Topology TopologyType="3DCoRectMesh" Dimensions="100000 100000 100000"/>
+      <Geometry GeometryType="ORIGIN_DXDYDZ"><DataItem Dimensions="3">0 0 0</DataItem>
+      <DataItem Dimensions="3">1 1 1</DataItem></Geometry></Grid>)";
+  std::string doubled;
+  for (int i = 0; i < 26; ++i) {
     const std::string next = fmt::format("<xi:include xpointer=\"xpointer(//Grid[@Name='g{}'])\"/>", i + 1);
-    doubled += fmt::format("<Grid Name=\"g{}\" GridType=\"{}\">", i, i == 26 ? "Uniform" : "Tree") +
-               (i == 26 ? "" : next + next) + "</Grid>";
+    doubled += fmt::format(R"(<Grid Name="g{}" GridType="Tree">{}{}</Grid>)", i, next, next);
   }
-  for (int i = 0; i < 150; ++i) nested += "<A>";
-  nested += "<DataItem Dimensions=\"1\">1</DataItem>";
-  for (int i = 0; i < 150; ++i) nested += "</A>";
+  doubled += R"(<Grid Name="g26" GridType="Uniform"></Grid>)";
   struct Case {
     const char *name, *part;
     std::string text;
   };
   const std::vector<Case> all{
-      {"a.nhdr", "", nrrd + "data file: pipe\n"},
-      {"zero.nhdr", "", nrrd + "line skip: 5\ndata file: /dev/zero\n"},
-      {"a.vtm", "pipe",
-       xml("vtkMultiBlockDataSet",
-           "<vtkMultiBlockDataSet><DataSet index=\"0\" file=\"pipe\"/></vtkMultiBlockDataSet>")},
-      {"a.pvd", "pipe",
-       xml("Collection", "<Collection><DataSet timestep=\"0\" part=\"0\" file=\"pipe\"/></Collection>")},
+      {"a.nhdr", "", numbers + "data file: pipe\n"},
+      {"zero.nhdr", "", numbers + "line skip: 5\ndata file: /dev/zero\n"},
+      {"a.vtm", "pipe", xml("vtkMultiBlockDataSet", R"(<DataSet index="0" file="pipe"/>)")},
+      {"a.pvd", "pipe", xml("Collection", R"(<DataSet timestep="0" part="0" file="pipe"/>)")},
       {"a.pvti", "pipe",
-       xml("PImageData",
-           "<PImageData WholeExtent=\"0 1 0 1 0 1\"><Piece Extent=\"0 1 0 1 0 1\" Source=\"pipe\"/></PImageData>")},
+       xml("PImageData", R"(<Piece Extent="0 1 0 1 0 1" Source="pipe"/>)", R"( WholeExtent="0 1 0 1 0 1")")},
       {"scalars.vtk", "",
        legacy(legacy_image, "POINT_DATA 8\nSCALARS s float 2000000000\nLOOKUP_TABLE default\n1 2 3\n")},
       {"array.vtk", "", legacy(legacy_image, "POINT_DATA 8\nFIELD f 1\na 2000000000 2000000000 float\n1 2 3\n")},
       {"cells.vtk", "", legacy(legacy_mesh, "CELLS 2000000000 2000000000\n4 0 1 2 3\n")},
       {"points.vtk", "", legacy("UNSTRUCTURED_GRID", "POINTS 2000000000 float\n0 0 0\n")},
       {"two.vtm", "",
-       xml("vtkMultiBlockDataSet",
-           "<vtkMultiBlockDataSet><DataSet index=\"0\" file=\"a.vti\"/><DataSet index=\"1\" file=\"b.vti\"/>"
-           "</vtkMultiBlockDataSet>")},
-      {"two.xdmf", "",
-       "<Xdmf><Domain><Grid GridType=\"Collection\" CollectionType=\"Spatial\">" + grid + grid +
-           "</Grid></Domain></Xdmf>"},
-      {"doubled.xdmf", "", "<Xdmf><Domain>" + doubled + "</Domain></Xdmf>"},
+       xml("vtkMultiBlockDataSet", R"(<DataSet index="0" file="a.vti"/><DataSet index="1" file="b.vti"/>)")},
+      {"two.xdmf", "", xdmf(R"(<Grid GridType="Collection" CollectionType="Spatial">)" + grid + grid + "</Grid>")},
+      {"doubled.xdmf", "", xdmf(doubled)},
       {"paths.xdmf", "",
-       "<Xdmf><Domain>" + nested +
-           "<Grid><Topology TopologyType=\"3DSMesh\" Dimensions=\"2 2 2\"/><Geometry><DataItem "
-           "Reference=\"//A//A//A//A//A//A//A//A\"/></Geometry></Grid></Domain></Xdmf>"}};
+       xdmf(repeated("<A>", 150) + R"(<DataItem Dimensions="1">1</DataItem>)" + repeated("</A>", 150) +
+            R"(<Grid><Topology TopologyType="3DSMesh" Dimensions="2 2 2"/>
+               <Geometry><DataItem Reference="//A//A//A//A//A//A//A//A"/></Geometry></Grid>)")}};
   for (const Case& each : all) {
     write(each.name, each.text);
     refuses_soon(each.name, each.part);
@@ -340,49 +303,30 @@ TEST_F(HostileFiles, OfEnSight) {
 }
 
 TEST_F(HostileFiles, PipesInCasesOfOpenFoam) {
-  const auto is_refused = [&](const std::string& pipe) {
+  for (const std::string pipe : {"constant/polyMesh/boundary", "1/U", "1/lagrangian/cloud/positions"}) {
     for (const std::string name : {"system/controlDict", "constant/polyMesh/points", "constant/polyMesh/faces",
                                    "constant/polyMesh/owner", "constant/polyMesh/neighbour", "1/p"})
-      write_bytes(in_folder("case/" + name), "x");
+      write("case/" + name, "x");
     make_pipe("case/" + pipe);
     refuses_soon("case", pipe + ": is a pipe or a device");
     std::filesystem::remove_all(in_folder("case"));
-  };
-  for (const char* pipe : {"constant/polyMesh/boundary", "1/U", "1/lagrangian/cloud/positions"}) is_refused(pipe);
+  }
 }
 
 // Where `tensorray-import` is not built: all that needs no VTK works, and the rest says what to do.
 
-class WithoutImport : public Program {
- protected:
-  /// Runs a copy of the program, beside which nothing lies.
-  Outcome run_alone(const std::string& arguments) const {
-    const std::filesystem::path alone = in_folder("bin") / "tensorray";
-    std::filesystem::create_directories(alone.parent_path());
-    std::filesystem::copy_file(TENSORRAY_BINARY, alone, std::filesystem::copy_options::skip_existing);
-    const int status = std::system(
-        ("cd '" + in_folder("").string() + "' && bin/tensorray " + arguments + " > stdout 2> stderr").c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(in_folder("stdout")),
-            read_file(in_folder("stderr"))};
-  }
-};
-
-TEST_F(WithoutImport, TheErrorSaysHowToBuildIt) {
+TEST_F(Program, WithoutImportWhatNeedsItSaysHowToBuildIt) {
+  std::filesystem::copy_file(TENSORRAY_BINARY, in_folder("alone"));  // Nothing lies beside it.
   write("scene.json", small_scene());
   write("a.vtu", "");
   write("lines.vtp", "<VTKFile/>");
   for (const std::string arguments :
        {"import a.vtu -o a.vdb",
-        "render scene.json -q --set integrator.type=path_tracing --set integrator.paths=lines.vtp -o a.png"}) {
-    expect_one_line(run_alone(arguments), "`tools/setup release import`", 1);
-  }
-}
-
-TEST_F(WithoutImport, PicturesAreRenderedAndVtkFilesWritten) {
-  write("scene.json", small_scene());
-  const Outcome outcome = run_alone("render scene.json -q -o a.png -o photons.vtp");
+        "render scene.json -q --set integrator.type=path_tracing --set integrator.paths=lines.vtp -o a.png"})
+    expect_one_line(run_shell("./alone " + arguments), "`tools/setup release import`", 1);
+  const Outcome outcome = run_shell("./alone render scene.json -q -o a.png -o photons.vtp");
   EXPECT_EQ(outcome.status, 0) << outcome.error;
-  for (const char* file : {"a.png", "photons.vtp"}) EXPECT_TRUE(std::filesystem::exists(in_folder(file))) << file;
+  EXPECT_TRUE(has("a.png") && has("photons.vtp"));
 }
 
 }  // namespace

@@ -1,9 +1,7 @@
 // Programs beside `tensorray`: tools/clip, tools/gallery and the benchmark.
 
 #include <iostream>
-#include <numeric>
 
-#include "renderer/images/image.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
@@ -14,7 +12,6 @@ namespace fs = std::filesystem;
 class Clip : public Program {
  protected:
   void SetUp() override {
-    Program::SetUp();
     write("scene.json", R"({"field": {"generate": {"kind": "point_load", "resolution": 9}, "scale": 2},
         "light": {"photons": 500, "wavelengths": {"count": 4}, "direction": {"keys": [[1, [0, 0, -1]], [9, [0, 1, -1]]]}},
         "receiver": {"resolution": [33, 24]}, "integrator": {"type": "photon_distribution"}})");
@@ -29,19 +26,13 @@ TEST_F(Clip, HasAllFrames) {
     const Outcome outcome = run_script("clip", fmt::format("'frame.##.png' {} 12", name));
     ASSERT_EQ(outcome.status, 0) << outcome.error;
     EXPECT_EQ(outcome.out, fmt::format("wrote {}, 3 frames\n", name));
-    const std::string probe = fmt::format(
-        "cd '{}' && ffprobe -v error -count_frames -select_streams v -show_entries stream=nb_read_frames,r_frame_rate "
-        "-of csv=p=0 {} >probe",
-        in_folder("").string(), name);
-    ASSERT_EQ(std::system(probe.c_str()), 0);
-    const std::string found = read_file(in_folder("probe"));  // GIF counts hundredths of a second.
-    EXPECT_NE(found.find(",3\n"), std::string::npos) << found;
+    const std::string probe =
+        "ffprobe -v error -count_frames -select_streams v -show_entries stream=nb_read_frames,r_frame_rate "
+        "-of csv=p=0 ";
+    const std::string found = run_shell(probe + name).out;  // GIF counts hundredths of a second.
+    EXPECT_THAT(found, HasSubstr(",3\n"));
     EXPECT_TRUE(std::string(name) == "a.gif" || found.substr(0, 5) == "12/1,") << found;
   }
-}
-
-TEST_F(Clip, APictureIsASheetOfAllFrames) {
-  if (std::system("command -v ffmpeg >/dev/null") != 0) GTEST_SKIP() << "ffmpeg is not installed";
   const Outcome outcome = run_script("clip", "'frame.##.png' sheet.png");
   ASSERT_EQ(outcome.status, 0) << outcome.error;
   const Image sheet = read_image(in_folder("sheet.png")), first = read_image(in_folder("frame.01.png"));
@@ -75,10 +66,10 @@ constexpr int cells = 16;
 std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
 
 /// Mean light of the cells of a picture, about linear and multiplied by alpha; three values a cell.
-std::vector<double> shrunk(const fs::path& file) {
+Eigen::ArrayXd shrunk(const fs::path& file) {
   const Image image = read_image(file);
   constexpr int samples = 24;  // Of a cell, along a side.
-  std::vector<double> means(3 * cells * cells);
+  Eigen::ArrayXd means = Eigen::ArrayXd::Zero(3 * cells * cells);
   for (int y = 0; y < cells * samples; ++y)
     for (int x = 0; x < cells * samples; ++x) {
       const float* const pixel = image.pixel(x * image.width / (cells * samples), y * image.height / (cells * samples));
@@ -91,18 +82,14 @@ std::vector<double> shrunk(const fs::path& file) {
 
 /// Mean difference of the cells' values. The automatic exposure depends on the resolution: a factor of up to 1.35,
 /// which all cells have in common, is no difference.
-double distance(const std::vector<double>& a, const std::vector<double>& b) {
-  const double sum_a = std::accumulate(a.begin(), a.end(), 1e-9), sum_b = std::accumulate(b.begin(), b.end(), 1e-9);
-  const double gain = std::clamp(sum_a / sum_b, 1 / 1.35, 1.35);
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(a[i] - gain * b[i]);
-  return sum / static_cast<double>(a.size());
+double distance(const Eigen::ArrayXd& a, const Eigen::ArrayXd& b) {
+  const double gain = std::clamp((a.sum() + 1e-9) / (b.sum() + 1e-9), 1 / 1.35, 1.35);
+  return (a - gain * b).abs().mean();
 }
 
 class Gallery : public Program {
  protected:
   void SetUp() override {
-    Program::SetUp();
     if (std::system("python3 -c '' 2>/dev/null") != 0) GTEST_SKIP() << "Python 3 is not installed";
   }
 
@@ -134,19 +121,18 @@ TEST_F(Gallery, PicturesAreWhatTheirCommandsMake) {
 
 TEST_F(Program, TheBenchmarkPrintsRatesAndRatios) {
   const auto benchmark = std::filesystem::path(TENSORRAY_BINARY).replace_filename("tensorray_bench");
-  const std::string out = in_folder("out").string();
   const auto measure = [&](const std::string& options) {
-    const int status = std::system(("'" + benchmark.string() + "' " + options + " > '" + out + "' 2>&1").c_str());
-    EXPECT_EQ(status, 0) << read_file(out);
-    return read_file(out);
+    const Outcome outcome = run_shell(quoted(benchmark) + " " + options);
+    EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.error;
+    return outcome.out + outcome.error;
   };
   const std::string questions = measure("--benchmark_list_tests");
   for (const char* const question : {"rays/", "pictures/", "caustics/", "loading/", "view/"})
-    EXPECT_NE(questions.find(question), std::string::npos) << question;
+    EXPECT_THAT(questions, HasSubstr(question));
 
   const std::string rates = measure("--benchmark_filter='^loading/64' --benchmark_min_time=0.001");
   for (const char* const word : {"processor: ", "loading/64_voxels/vdb", "ratio=1"})
-    EXPECT_NE(rates.find(word), std::string::npos) << rates;
+    EXPECT_THAT(rates, HasSubstr(word));
 }
 
 }  // namespace

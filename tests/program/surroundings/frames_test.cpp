@@ -1,6 +1,5 @@
 // Sequences of frames, and renders that a queue divides.
 
-#include "renderer/images/image.h"
 #include "tests/program/divided_scenes.h"
 #include "tests/program/support.h"
 
@@ -10,12 +9,10 @@ namespace {
 class Frames : public Program {
  protected:
   void SetUp() override {
-    Program::SetUp();
     run_well({"make", "point_load", "-o", "load.0001.vdb", "--resolution", "9"});
     run_well({"make", "vortex", "-o", "load.0003.vdb", "--resolution", "9"});
+    write("scene.json", R"({"field": {"file": "load.0001.vdb"})" + rest_);
   }
-
-  std::vector<float> pixels(const std::string& name) const { return read_image(in_folder(name)).pixels; }
 
   const std::string rest_ = R"(, "light": {"photons": 500, "wavelengths": {"count": 4},
       "direction": {"keys": [[1, [0, 0, -1]], [3, [0, 1, -1]]]}},
@@ -25,11 +22,11 @@ class Frames : public Program {
 TEST_F(Frames, KeyframesAndNumberedFieldsAreFollowed) {
   write("scene.json", R"({"field": {"file": "load.####.vdb", "scale": 2})" + rest_);
   run_well({"render", "scene.json", "--frames", "1-3x2", "-o", "out.##.exr", "--stats", "out.##.json", "-q"});
-  for (const char* frame : {"1", "3"}) {
-    const std::string number(frame), direction = number == "1" ? "[0,0,-1]" : "[0,1,-1]";
-    run_well({"render", "scene.json", "--set", "light.direction=" + direction, "--set",
-              "field.file=load.000" + number + ".vdb", "-o", "alone.exr", "-q"});
-    EXPECT_EQ(pixels("out.0" + number + ".exr"), pixels("alone.exr")) << frame;
+  for (const std::string number : {"1", "3"}) {
+    const std::string direction = number == "1" ? "[0,0,-1]" : "[0,1,-1]";
+    run_well(joined({"render", "scene.json", "-o", "alone.exr", "-q"},
+                    changes({"light.direction=" + direction, "field.file=load.000" + number + ".vdb"})));
+    EXPECT_EQ(pixels("out.0" + number + ".exr"), pixels("alone.exr")) << number;
     EXPECT_TRUE(has("out.0" + number + ".json"));
   }
   EXPECT_FALSE(has("out.02.exr"));
@@ -38,25 +35,23 @@ TEST_F(Frames, KeyframesAndNumberedFieldsAreFollowed) {
 }
 
 TEST_F(Frames, TheAutomaticScaleIsThatOfTheFirstFrame) {
-  write("scene.json", R"({"field": {"file": "load.0001.vdb"})" + rest_);
   run_well({"render", "scene.json", "--frames", "1-3", "-q"});  // The field is loaded once.
   run_well({"render", "scene.json", "--frames", "1", "--stats", "stats.json", "-o", "first.exr", "-q"});
-  const double scale = read_json("stats.json")["field"]["scale"];
+  const json scale = read_json("stats.json")["field"]["scale"];
   EXPECT_EQ(pixels("scene.0001.exr"), pixels("first.exr"));
-  run_well({"render", "scene.json", "--set", "light.direction=[0,1,-1]", "--set",
-            "field.scale=" + read_json("stats.json")["field"]["scale"].dump(), "-o", "last.exr", "-q"});
+  run_well(joined({"render", "scene.json", "-o", "last.exr", "-q"},
+                  changes({"light.direction=[0,1,-1]", "field.scale=" + scale.dump()})));
   EXPECT_GT(scale, 0);
   EXPECT_EQ(pixels("scene.0003.exr"), pixels("last.exr"));
 }
 
 TEST_F(Frames, ExistingFramesAreLeftOutOnRequest) {
-  write("scene.json", R"({"field": {"file": "load.0001.vdb"})" + rest_);
   run_well({"render", "scene.json", "--frames", "1-2", "-o", "a.#.exr", "-q"});
   const std::vector<float> second = pixels("a.2.exr");
   write("a.1.exr", "kept");
   std::filesystem::remove(in_folder("a.2.exr"));
   run_well({"render", "scene.json", "--frames", "1-2", "-o", "a.#.exr", "--skip-existing", "-q"});
-  EXPECT_EQ(read_file(in_folder("a.1.exr")), "kept");
+  EXPECT_EQ(contents("a.1.exr"), "kept");
   EXPECT_EQ(pixels("a.2.exr"), second);
 }
 
@@ -71,30 +66,29 @@ TEST_F(Frames, ABadFrameStopsNoOthersOnRequest) {
   const Outcome outcome = run(joined(arguments, {"--keep-going"}));
   EXPECT_EQ(outcome.status, 1);
   for (const std::string frame : {"01", "03", "05"}) EXPECT_TRUE(has("a." + frame + ".exr"));
-  for (const char* line : {"tensorray: frame 0: ", "tensorray: frame 4: ", "tensorray: frame 2: ",
-                           "tensorray: 3 frames failed: 0, 4, 2; render again with --frames 0,4,2"})
-    EXPECT_NE(outcome.error.find(line), std::string::npos) << line << outcome.error;
+  EXPECT_THAT(outcome.error, AllOf(HasSubstr("tensorray: frame 0: "), HasSubstr("tensorray: frame 4: "),
+                                   HasSubstr("tensorray: frame 2: "),
+                                   HasSubstr("tensorray: 3 frames failed: 0, 4, 2; render again with --frames 0,4,2")));
   EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 4) << outcome.error;
 
   // No frame is well: each is named.
   const Outcome none = run({"render", "scene.json", "--frames", "4,0", "-o", "c.#.exr", "-q", "--keep-going"});
   EXPECT_EQ(none.status, 1);
-  for (const char* line : {"tensorray: frame 4: ", "tensorray: frame 0: ", "tensorray: 2 frames failed: 4, 0;"})
-    EXPECT_NE(none.error.find(line), std::string::npos) << line << none.error;
+  EXPECT_THAT(none.error, AllOf(HasSubstr("tensorray: frame 4: "), HasSubstr("tensorray: frame 0: "),
+                                HasSubstr("tensorray: 2 frames failed: 4, 0;")));
   expect_error("unknown key `/field/files`",
                {"render", "scene.json", "--frames", "4,0", "-o", "c.#.exr", "--keep-going", "--set", "field.files=1"});
 
   // A frame whose scene is wrong, and not its files.
   const Outcome wrong =
-      run({"render", "scene.json", "--frames", "1-3", "--keep-going", "-q", "-o", "b.$F.exr", "--set",
-           R"(light.photons={"keys":[[1,500],[2,-1],[3,500]]})", "--set", "field.file=load.0001.vdb"});
+      run(joined({"render", "scene.json", "--frames", "1-3", "--keep-going", "-q", "-o", "b.$F.exr"},
+                 changes({R"(light.photons={"keys":[[1,500],[2,-1],[3,500]]})", "field.file=load.0001.vdb"})));
   EXPECT_EQ(wrong.status, 1);
-  EXPECT_NE(wrong.error.find("tensorray: 1 frame failed: 2;"), std::string::npos) << wrong.error;
+  EXPECT_THAT(wrong.error, HasSubstr("tensorray: 1 frame failed: 2;"));
   EXPECT_TRUE(has("b.1.exr") && has("b.3.exr"));
 }
 
 TEST_F(Frames, MistakesAreNamed) {
-  write("scene.json", R"({"field": {"file": "load.0001.vdb"})" + rest_);
   expect_error("`/light/direction` has keyframes: give --frames", {"render", "scene.json", "-q"});
   expect_error("each frame would replace it", {"render", "scene.json", "--frames", "1-2", "-o", "one.exr"});
   expect_error("s.json", {"render", "scene.json", "--frames", "1-2", "-o", "a.#.exr", "--stats", "s.json"});
@@ -103,9 +97,8 @@ TEST_F(Frames, MistakesAreNamed) {
     expect_error("has the number of a frame; give --frames",
                  joined({"render", "scene.json", "--set", "light.direction=[0,0,-1]"}, option));
   expect_error("--save-scene", {"render", "scene.json", "--frames", "1-2", "--save-scene", "copy.json"});
-  EXPECT_FALSE(has("one.exr"));
-  const pid_t piped = start_in("cat scene.json |", {"render", "/dev/stdin", "--frames", "1-2", "-o", "a.#.exr"});
-  expect_one_line(wait_for(piped), "a pipe is read once", 2);
+  const Outcome piped = run({"render", "/dev/stdin", "--frames", "1-2", "-o", "a.#.exr"}, "cat scene.json |");
+  expect_one_line(piped, "a pipe is read once", 2);
 }
 
 // tools/render_array, with programs in the PATH that stand for those of queues, and run their tasks at once.
@@ -136,13 +129,11 @@ exit "${failed:-0}"
 class RenderArray : public Program {
  protected:
   void SetUp() override {
-    Program::SetUp();
     write("scene.json", path_scene);
     run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "17"});
   }
 
   void put_in_path(const std::string& name, const std::string& program) const {
-    std::filesystem::create_directories(in_folder("bin"));
     write("bin/" + name, program);
     std::filesystem::permissions(in_folder("bin/" + name), std::filesystem::perms::owner_all);
   }
@@ -168,15 +159,15 @@ class RenderArray : public Program {
 TEST_F(RenderArray, SlurmMergesWhatItsTasksMake) {
   put_in_path("sbatch", sbatch);
   expect_pictures(render_array("--with 'sbatch --partition=night' " + scene_and_pictures));
-  const std::string queue = read_file(in_folder("queue.log"));
-  EXPECT_EQ(queue.find("--partition=night --parsable --array=1-3 "), 0U) << queue;
-  EXPECT_NE(queue.find("\n--partition=night --dependency=afterok:17 "), std::string::npos) << queue;
+  const std::string queue = contents("queue.log");
+  EXPECT_THAT(queue, StartsWith("--partition=night --parsable --array=1-3 "));
+  EXPECT_THAT(queue, HasSubstr("\n--partition=night --dependency=afterok:17 "));
 }
 
 TEST_F(RenderArray, ParallelMergesWhatItsTasksMake) {
   put_in_path("parallel", parallel);
   expect_pictures(render_array("--with 'parallel --jobs 1' " + scene_and_pictures));
-  EXPECT_EQ(read_file(in_folder("queue.log")).find("--jobs 1 -q -I @TASK@ "), 0U);
+  EXPECT_THAT(contents("queue.log"), StartsWith("--jobs 1 -q -I @TASK@ "));
 }
 
 TEST_F(RenderArray, MergesNothingWhereATaskFails) {
@@ -185,8 +176,7 @@ TEST_F(RenderArray, MergesNothingWhereATaskFails) {
   for (const char* queue : {"sbatch", "parallel"}) {
     const Outcome outcome = render_array(fmt::format("--with {} 2 nowhere.json -o a.exr", queue));
     EXPECT_NE(outcome.status, 0) << queue;
-    EXPECT_NE(outcome.error.find("nowhere.json"), std::string::npos) << queue;
-    EXPECT_EQ(outcome.error.find(".shard"), std::string::npos) << queue;
+    EXPECT_THAT(outcome.error, AllOf(HasSubstr("nowhere.json"), Not(HasSubstr(".shard")))) << queue;
   }
 }
 
@@ -195,7 +185,7 @@ TEST_F(RenderArray, MergesShardsOfAnotherQueue) {
   for (const char* task : {"TASK=1", "TASK=2"}) EXPECT_EQ(render_array(options, task).status, 0) << task;
   const Outcome outcome = render_array("--merge 3 -q -o a.exr -o a.png");
   EXPECT_EQ(outcome.status, 1);
-  EXPECT_NE(outcome.error.find("part3.shard"), std::string::npos);
+  EXPECT_THAT(outcome.error, HasSubstr("part3.shard"));
   EXPECT_EQ(render_array(options, "TASK=3").status, 0);
   expect_pictures(render_array("--merge 3 -q -o a.exr -o a.png"));
 }

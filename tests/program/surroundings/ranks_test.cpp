@@ -2,21 +2,11 @@
 
 #include <optional>
 
-#include <sys/stat.h>
-
 #include "tests/program/divided_scenes.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
 namespace {
-
-std::string mpirun() {
-#ifdef TENSORRAY_MPIRUN
-  return TENSORRAY_MPIRUN;
-#else
-  return "";
-#endif
-}
 
 struct RankCase {
   std::string scene;
@@ -27,52 +17,37 @@ struct RankCase {
 class RanksProgram : public Program {
  protected:
   void SetUp() override {
-    Program::SetUp();
-    if (mpirun().empty() || !std::filesystem::exists(mpirun())) GTEST_SKIP() << "mpirun is not installed";
+    if (!std::filesystem::exists(TENSORRAY_MPIRUN)) GTEST_SKIP() << "mpirun is not installed";
     setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
     setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
     run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "17"});
   }
 
   /// Starts ranks with the test's folder as working folder. @return mpirun's process.
-  pid_t start_ranks(int ranks, const std::string& arguments) const {
+  pid_t start_ranks(int ranks, const Arguments& arguments) const {
     // What Open MPI leaks is not the program's: with the address sanitizer, leaks are not looked for.
-    const std::string command = fmt::format(
-        "cd '{}' && ASAN_OPTIONS=\"$ASAN_OPTIONS:detect_leaks=0\" exec '{}' --oversubscribe --bind-to none -n {} '{}' "
-        "render scene.json {} >out 2>error",
-        in_folder("").string(), mpirun(), ranks, TENSORRAY_BINARY, arguments);
-    const pid_t child = fork();
-    if (child != 0) return child;
-    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
-    _exit(127);
+    const std::string shell =
+        fmt::format(R"(ASAN_OPTIONS="$ASAN_OPTIONS:detect_leaks=0" exec '{}' --oversubscribe --bind-to none -n {})",
+                    TENSORRAY_MPIRUN, ranks);
+    return start(joined({"render", "scene.json"}, arguments), shell);
   }
 
-  int wait_for_ranks(pid_t child) const {
-    int status = 0;
-    waitpid(child, &status, 0);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  void render_with_ranks(int ranks, const Arguments& arguments) const {
+    const Outcome outcome = wait_for(start_ranks(ranks, arguments));
+    EXPECT_EQ(outcome.status, 0) << outcome.error;
   }
-
-  void render_with_ranks(int ranks, const std::string& arguments) const {
-    EXPECT_EQ(wait_for_ranks(start_ranks(ranks, arguments)), 0) << error();
-  }
-
-  std::string error() const { return read_file(in_folder("error")); }
 
   void expect_same(const std::string& a, const std::string& b) const { EXPECT_TRUE(is_equal(a, b)) << a << ", " << b; }
 
-  /// The process that is a rank of mpirun's process; none if it has not begun.
-  static std::optional<pid_t> process_of(pid_t parent, int rank) {
+  /// The process of a rank, which works in the test's folder; none if it has not begun.
+  std::optional<pid_t> process_of(int rank) const {
+    const std::filesystem::path here = std::filesystem::canonical(in_folder(""));
     const std::string name = fmt::format("OMPI_COMM_WORLD_RANK={}", rank) + '\0';
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator("/proc", error)) {
-      const std::string number = entry.path().filename().string();
-      if (number.find_first_not_of("0123456789") != std::string::npos) continue;
-      const std::string stat = read_file(entry.path() / "stat");
-      const std::size_t end = stat.rfind(')');
-      if (end == std::string::npos || end + 4 >= stat.size() || std::atoi(stat.c_str() + end + 4) != parent) continue;
-      if (read_file(entry.path() / "environ").find(name) != std::string::npos) return std::atoi(number.c_str());
-    }
+    std::error_code none;
+    for (const auto& process : std::filesystem::directory_iterator("/proc", none))
+      if (std::filesystem::read_symlink(process.path() / "cwd", none) == here &&
+          bytes_of(process.path() / "environ").find(name) != std::string::npos)
+        return std::stoi(process.path().filename().string());
     return std::nullopt;
   }
 };
@@ -91,16 +66,16 @@ TEST_F(RanksProgram, GiveTheFilesOfOneProcess) {
   for (const RankCase& each : cases) {
     SCOPED_TRACE(each.scene);
     write("scene.json", each.scene);
-    Arguments alone{"render", "scene.json", "-q", "--stats", "one.json"};
-    std::string together = "-q --threads 1 --stats a.json";
+    Arguments alone{"render", "scene.json", "-q", "--stats", "one.json"},
+        together{"-q", "--threads", "1", "--stats", "a.json"};
     for (const std::string& ending : each.endings) {
       alone.insert(alone.end(), {"-o", "one." + ending});
-      together += " -o a." + ending;
+      together.insert(together.end(), {"-o", "a." + ending});
     }
     run_well(alone);
     render_with_ranks(each.ranks, together);
     for (const std::string& ending : each.endings) expect_same("a." + ending, "one." + ending);
-    const nlohmann::json one = read_json("one.json"), many = read_json("a.json");
+    const json one = read_json("one.json"), many = read_json("a.json");
     if (each.ranks == 1) continue;
     EXPECT_EQ(many["ranks"]["count"], each.ranks);
     if (each.scene == lit_scene) continue;  // Each rank counts its own ways through the field.
@@ -116,11 +91,11 @@ TEST_F(RanksProgram, DivideTheFramesOfASequence) {
       "receiver": {"resolution": [24, 24]}})");
   const Outcome alone = run({"render", "scene.json", "-q", "--frames", "1-5", "--keep-going", "-o", "one.#.exr"});
   EXPECT_EQ(alone.status, 1);
-  EXPECT_EQ(wait_for_ranks(start_ranks(3, "--frames 1-5 --keep-going -o a.#.exr")), 1);
+  const Outcome together = wait_for(start_ranks(3, {"--frames", "1-5", "--keep-going", "-o", "a.#.exr"}));
+  EXPECT_EQ(together.status, 1);
   for (const int frame : {1, 2, 3, 5}) expect_same(fmt::format("a.{}.exr", frame), fmt::format("one.{}.exr", frame));
-  const std::string last = "1 frame failed: 4; render again with --frames 4";
-  EXPECT_NE(alone.error.find(last), std::string::npos) << alone.error;
-  EXPECT_NE(error().find(last), std::string::npos) << error();
+  for (const std::string& error : {alone.error, together.error})
+    EXPECT_THAT(error, HasSubstr("1 frame failed: 4; render again with --frames 4"));
 }
 
 /// Nobody reads the pipe, so that no job ends by itself, however quick the machine is: it waits there with all of its
@@ -128,20 +103,22 @@ TEST_F(RanksProgram, DivideTheFramesOfASequence) {
 TEST_F(RanksProgram, AKilledRankEndsTheJobWhichContinuesToTheSameFiles) {
   write("scene.json", path_scene);
   run_well({"render", "scene.json", "-q", "-o", "one.png", "-o", "one.exr"});
-  ASSERT_EQ(mkfifo(in_folder("pipe").c_str(), 0600), 0);
+  make_pipe("pipe");
   for (const int rank : {1, 0}) {
     std::filesystem::remove(in_folder("a.png.checkpoint"));
-    const pid_t job = start_ranks(2, "-q -o a.png -o a.exr --threads 1 --checkpoint 0.01 --stats pipe");
+    const pid_t job = start_ranks(
+        2, {"-q", "-o", "a.png", "-o", "a.exr", "--threads", "1", "--checkpoint", "0.01", "--stats", "pipe"});
     while (!has("a.png.checkpoint") && is_running(job)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    const std::optional<pid_t> process = process_of(job, rank);
-    ASSERT_TRUE(process) << error();
+    const std::optional<pid_t> process = process_of(rank);
+    ASSERT_TRUE(process) << contents("stderr");
     kill(*process, SIGKILL);
-    EXPECT_NE(wait_for_ranks(job), 0);  // The other does not wait for it.
-    EXPECT_NE(error().find(fmt::format("rank {}", rank)), std::string::npos) << error();
+    const Outcome outcome = wait_for(job);
+    EXPECT_NE(outcome.status, 0);  // The other does not wait for it.
+    EXPECT_THAT(outcome.error, HasSubstr(fmt::format("rank {}", rank)));
     EXPECT_TRUE(has("a.png.checkpoint"));
     EXPECT_FALSE(is_equal("a.exr", "one.exr"));
   }
-  render_with_ranks(2, "--resume -q -o a.png -o a.exr");
+  render_with_ranks(2, {"--resume", "-q", "-o", "a.png", "-o", "a.exr"});
   expect_same("a.png", "one.png");
   expect_same("a.exr", "one.exr");
   EXPECT_FALSE(has("a.png.checkpoint"));
@@ -149,8 +126,9 @@ TEST_F(RanksProgram, AKilledRankEndsTheJobWhichContinuesToTheSameFiles) {
 
 TEST_F(RanksProgram, ErrorsOfASceneAreSaidOnce) {
   write("scene.json", R"({"field": {"file": "none.vdb"}, "integrator": {"type": "lens"}})");
-  EXPECT_NE(wait_for_ranks(start_ranks(3, "-o a.png")), 0);
-  EXPECT_THAT(error(), AllOf(HasSubstr("none.vdb"), Not(testing::ContainsRegex("none.vdb(.|\n)*none.vdb"))));
+  const Outcome outcome = wait_for(start_ranks(3, {"-o", "a.png"}));
+  EXPECT_NE(outcome.status, 0);
+  EXPECT_THAT(outcome.error, AllOf(HasSubstr("none.vdb"), Not(testing::ContainsRegex("none.vdb(.|\n)*none.vdb"))));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 // result, or one line and no file. Estimates of memory are near what is needed.
 
 #include <map>
+#include <regex>
 
 #include "tests/program/support.h"
 
@@ -14,7 +15,6 @@ class Limits : public Program {
 #ifdef TENSORRAY_SANITIZED
     GTEST_SKIP() << "the address sanitizer needs terabytes of addresses";
 #endif
-    Program::SetUp();
     write("scene.json", small_scene());
   }
 
@@ -27,8 +27,8 @@ class Limits : public Program {
     return "exec " + user + "prlimit --nproc=1";
   }
 
-  Outcome run_in(const std::string& shell, const Arguments& more) const {
-    return wait_for(start_in(shell, joined({"render", "scene.json", "-q", "-o", "a.png"}, more)));
+  Outcome render_in(const std::string& shell, const Arguments& more) const {
+    return run(joined({"render", "scene.json", "-q", "-o", "a.png"}, more), shell);
   }
 };
 
@@ -42,22 +42,19 @@ TEST_F(Limits, AreSaidInOneLine) {
   const std::string little = "ulimit -v 3000000; exec";
   const std::vector<Case> cases{
       {without_threads(), {}, 1, "Resource temporarily unavailable"},
-      {little, {"--set", "receiver.resolution=[16000,16000]"}, 2, "`/receiver/resolution` needs about"},
+      {little, changes({"receiver.resolution=[16000,16000]"}), 2, "`/receiver/resolution` needs about"},
       {little,
-       {"--set", "receiver.resolution=[5000,5000]", "--set", "light.wavelengths.count=64", "-o", "a.spectral.exr"},
-       2,
+       joined({"-o", "a.spectral.exr"}, changes({"receiver.resolution=[5000,5000]", "light.wavelengths.count=64"})), 2,
        "needs about"},
-      {little, {"--set", "integrator.type=lens", "--set", "receiver.resolution=[8000,8000]"}, 2, "ulimit -v"},
-      {little,
-       {"--set", "integrator.type=scene", "--set", "integrator.bands=64", "--set", "camera.resolution=[3000,3000]"},
-       2,
+      {little, changes({"integrator.type=lens", "receiver.resolution=[8000,8000]"}), 2, "ulimit -v"},
+      {little, changes({"integrator.type=scene", "integrator.bands=64", "camera.resolution=[3000,3000]"}), 2,
        "needs about"},
-      {little, {"--set", "integrator.type=path_tracing", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},
-      {little, {"--set", "integrator.type=scene", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},
-      {little, {"--set", "field.generate.resolution=600"}, 2, "resolution: the voxels need about"},
+      {little, changes({"integrator.type=path_tracing", "camera.resolution=[6000,6000]"}), 2, "needs about"},
+      {little, changes({"integrator.type=scene", "camera.resolution=[6000,6000]"}), 2, "needs about"},
+      {little, changes({"field.generate.resolution=600"}), 2, "resolution: the voxels need about"},
       {"ulimit -v 200000; exec", {"--threads", "2"}, 1, "threads can be started"}};
   for (const Case& each : cases) {
-    const Outcome outcome = run_in(each.shell, each.more);
+    const Outcome outcome = render_in(each.shell, each.more);
     expect_one_line(outcome, each.line, each.status);
     EXPECT_THAT(outcome.error, StartsWith("tensorray: "));
     EXPECT_FALSE(has("a.png"));
@@ -66,7 +63,7 @@ TEST_F(Limits, AreSaidInOneLine) {
 
 TEST_F(Limits, OfProcessorsAreThoseOfTheRun) {
   for (const auto& [shell, threads] : {std::pair("exec taskset 1", "4"), {"exec", "1"}}) {
-    const Outcome outcome = run_in(shell, {"--threads", threads, "--stats", "stats.json"});
+    const Outcome outcome = render_in(shell, {"--threads", threads, "--stats", "stats.json"});
     ASSERT_EQ(outcome.status, 0) << outcome.error;
     EXPECT_EQ(read_json("stats.json")["threads"], 1) << shell;
   }
@@ -74,14 +71,9 @@ TEST_F(Limits, OfProcessorsAreThoseOfTheRun) {
 
 /// "needs about 1.5 GiB", in bytes.
 double needed_bytes(const std::string& error) {
-  const std::string words = "needs about ";
-  const std::size_t at = error.find(words);
-  if (at == std::string::npos) return NAN;
-  std::istringstream text(error.substr(at + words.size()));
-  double number = 0;
-  std::string unit;
-  text >> number >> unit;
-  return number * (unit.rfind("GiB", 0) == 0 ? std::exp2(30) : unit.rfind("MiB", 0) == 0 ? std::exp2(20) : NAN);
+  std::smatch match;
+  if (!std::regex_search(error, match, std::regex("needs about ([0-9.]+) ([GM])iB"))) return NAN;
+  return std::stod(match[1]) * (match[2] == "G" ? 0x1p30 : 0x1p20);
 }
 
 /// What a larger picture needs more than a smaller one: as it is estimated, and as it is measured.
@@ -91,17 +83,17 @@ TEST_F(Limits, EstimatesOfMemoryAreNearWhatIsMeasured) {
     const char* key;
     int small, large;
   };
-  const Arguments paths{"--set", "integrator.type=path_tracing", "--set", "integrator.max_samples=1",
-                        "--set", "integrator.min_samples=1",     "--set", "integrator.seeds.count=10"},
-      histogram{"--set", R"(integrator.density={"kind":"histogram"})"};
+  const Arguments histogram = changes({R"(integrator.density={"kind":"histogram"})"}),
+                  paths = changes({"integrator.type=path_tracing", "integrator.max_samples=1",
+                                   "integrator.min_samples=1", "integrator.seeds.count=10"});
   for (const Case& each :
        {Case{histogram, "receiver.resolution", 1500, 3000}, Case{paths, "camera.resolution", 300, 1000}}) {
     double estimate[2], measured[2];
     for (const int i : {0, 1}) {
       const std::string size = fmt::format("{0}=[{1},{1}]", each.key, i == 0 ? each.small : each.large);
       const Arguments arguments = joined(each.more, {"--set", size});
-      estimate[i] = needed_bytes(run_in("ulimit -d 120000; exec", arguments).error);
-      const Outcome outcome = run_in("exec", joined(arguments, {"--stats", "stats.json"}));
+      estimate[i] = needed_bytes(render_in("ulimit -d 120000; exec", arguments).error);
+      const Outcome outcome = render_in("exec", joined(arguments, {"--stats", "stats.json"}));
       ASSERT_EQ(outcome.status, 0) << outcome.error;
       measured[i] = read_json("stats.json")["peak_memory_bytes"];
     }
@@ -130,7 +122,7 @@ TEST_F(Memory, AFieldInAFileGivesTheSamePictures) {
     run_well({"render", "scene.json", "-q", "-o", "part.exr", "--memory", "1M"});
     EXPECT_TRUE(is_equal("all.exr", "part.exr")) << field;
   }
-  EXPECT_EQ(files(), (std::vector<std::string>{"all.exr", "load.vdb", "part.exr", "scene.json"}));
+  EXPECT_THAT(files(), ElementsAre("all.exr", "load.vdb", "part.exr", "scene.json"));
 }
 
 #ifndef TENSORRAY_SANITIZED  // A sanitizer has memory of its own.
@@ -141,7 +133,7 @@ TEST_F(Memory, AFieldMayBeLargerThanTheMemory) {
   write("scene.json", scene(R"({"generate": {"kind": "point_load", "resolution": 200}, "eigenvalues": "raw"})"));
   const auto status_with = [&](const Arguments& more) {
     const Arguments render{"render", "scene.json", "-q", "--threads", "2", "-o"};
-    return wait_for(start_in("ulimit -d 300000; exec", joined(render, more))).status;
+    return run(joined(render, more), "ulimit -d 300000; exec").status;
   };
   EXPECT_EQ(status_with({"a.exr"}), 2);
   EXPECT_EQ(status_with({"a.exr", "--memory", "64M"}), 0);
@@ -159,23 +151,23 @@ TEST_P(CommonField, OfAllProcessesOfAMachineIsOne) {
   std::filesystem::create_directory(in_folder("tmp"));
   const std::string shell = "export TMPDIR=\"$PWD/tmp\"; ";
   const auto notes_of = [&](const std::string& name) {
-    const Outcome outcome = wait_for(start_in(shell + "exec", joined(render, {name})));
+    const Outcome outcome = run(joined(render, {name}), shell + "exec");
     EXPECT_EQ(outcome.status, 0) << outcome.error;
     return outcome.error;
   };
-  EXPECT_EQ(notes_of("alone.exr").find(note), std::string::npos);
+  EXPECT_THAT(notes_of("alone.exr"), Not(HasSubstr(note)));
 
   const pid_t first =
-      start_in(shell + "exec 2>first.log; exec", joined(render, {"first.exr", "--set", "light.photons=4000000000"}));
-  while (read_file(in_folder("first.log")).find("voxels") == std::string::npos) {
-    ASSERT_EQ(waitpid(first, nullptr, WNOHANG), 0) << read_file(in_folder("first.log"));
+      start(joined(render, {"first.exr", "--set", "light.photons=4000000000"}), shell + "exec 2>first.log; exec");
+  while (contents("first.log").find("voxels") == std::string::npos) {
+    ASSERT_EQ(waitpid(first, nullptr, WNOHANG), 0) << contents("first.log");
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   kill(first, SIGSTOP);
-  EXPECT_NE(notes_of("shared.exr").find(note), std::string::npos);
+  EXPECT_THAT(notes_of("shared.exr"), HasSubstr(note));
   kill(first, SIGKILL);
   wait_for(first);
-  EXPECT_EQ(notes_of("again.exr").find(note), std::string::npos);
+  EXPECT_THAT(notes_of("again.exr"), Not(HasSubstr(note)));
 
   for (const char* name : {"shared.exr", "again.exr"}) EXPECT_TRUE(is_equal("alone.exr", name)) << name;
   EXPECT_TRUE(std::filesystem::is_empty(in_folder("tmp")));
@@ -188,7 +180,8 @@ INSTANTIATE_TEST_SUITE_P(
         R"({"generate": {"kind": "vortex", "resolution": 40}, "scale": 1, "border": "extend"})",
         R"({"generate": {"kind": "point_load", "resolution": 40}, "scale": 1, "interpolation": "linear"})"));
 
-/// How a command ends: with status 0 and its result, or else with a line that has this text, and without a file.
+/// How a command ends: with status 0 and its result, or else without a file and with a line that has this text, which
+/// may be null where nobody sees standard error.
 struct End {
   int status = 0;
   const char* line = "";
@@ -198,8 +191,7 @@ struct Place {
   const char* name;
   const char* shell;                ///< Commands before the program; the last word runs it.
   std::map<std::string, End> ends;  ///< Of commands; "" of all others.
-  const char* folder = ".";         ///< For the results, within that of the test.
-  bool shows_errors = true;         ///< Whether standard error is a file.
+  std::string folder = ".";         ///< For the results, within that of the test.
 };
 
 /// A command and the files that it makes, which must have the same bytes everywhere.
@@ -217,23 +209,15 @@ const std::vector<Command> commands{
     {"import", {"import", "INPUTS/tensors.nrrd", "-o", "RESULTS/i.vdb"}, {"i.vdb"}},
     {"view", {"view", "INPUTS/scene.json", "--port", "0"}, {}}};
 
-// Names of 255 bytes, which are the longest.
-#define TEN "0123456789"
-#define FIFTY TEN TEN TEN TEN TEN
-
 const std::vector<Place> places{
     {"no environment", "exec env -i", {}},
     {"no HOME, a relative state folder", "unset HOME TERM; XDG_STATE_HOME=state exec", {}},
-    {"standard error is closed", "exec 2>&-; exec", {}, ".", false},
-    {"standard error is full", "exec 2>/dev/full; exec", {}, ".", false},
-    {"standard output is closed", "exec >&-; exec", {{"view", {1, "standard output"}}}, ".", true},
-    {"standard output is full", "exec >/dev/full; exec", {{"view", {1, "standard output"}}}, ".", true},
-    {"all streams are closed", "exec <&- >&- 2>&-; exec", {{"view", {1, ""}}}, ".", false},
-    {"a full disk",
-     "ulimit -f 0; exec",
-     {{"", {1, "cannot be written"}}, {"view", {1, "standard output"}}},
-     ".",
-     false},
+    {"standard error is closed", "exec 2>&-; exec", {}},
+    {"standard error is full", "exec 2>/dev/full; exec", {}},
+    {"standard output is closed", "exec >&-; exec", {{"view", {1, "standard output"}}}},
+    {"standard output is full", "exec >/dev/full; exec", {{"view", {1, "standard output"}}}},
+    {"all streams are closed", "exec <&- >&- 2>&-; exec", {{"view", {1, nullptr}}}},
+    {"a full disk", "ulimit -f 0; exec", {{"", {1, nullptr}}}},
     {"a working folder that is gone", "mkdir gone; cd gone; rmdir ../gone; exec", {}},
     {"another locale", "LC_ALL=de_DE.UTF-8 LANG=de_DE.UTF-8 exec", {}},
     {"one processor", "exec taskset 1", {}},
@@ -241,27 +225,18 @@ const std::vector<Place> places{
     {"little stack", "ulimit -s 256; exec", {}},
     {"too little stack", "ulimit -s 64; exec", {{"", {1, "ulimit -s"}}}},
     {"a folder whose name is no UTF-8", "exec", {}, "\xff\xc3(\xed\xa0\x80"},
-    {"a folder with the longest name", "exec", {}, FIFTY FIFTY FIFTY FIFTY FIFTY "01234"},
+    {"a folder with the longest name", "exec", {}, std::string(255, 'x')},
     {"a folder that is missing", "exec", {{"", {1, "there is no folder"}}, {"view", {}}}, "missing"}};
 
 class Surroundings : public Program {
  protected:
   void SetUp() override {
-    Program::SetUp();
-    std::filesystem::create_directories(in_folder("inputs"));
     write("inputs/scene.json", R"({"field": {"file": "field.vdb", "scale": 4}, "camera": {"resolution": [24, 20]},
         "integrator": {"type": "path_tracing", "max_samples": 4, "min_samples": 4, "seeds": {"count": 9}}})");
-    std::string tensors;
-    for (int i = 0; i < 2 * 3 * 4; ++i) tensors += "1.5 0 0.25 2 0 3\n";
-    write("inputs/tensors.nrrd",
-          "NRRD0005\ntype: float\ndimension: 4\nspace: right-anterior-superior\nsizes: 6 2 3 4\n"
-          "space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: 3D-symmetric-matrix space space space\n"
-          "encoding: ascii\n\n" +
-              tensors);
+    write("inputs/tensors.nrrd", nrrd("2 3 4", repeated("1.5 0 0.25 2 0 3\n", 2 * 3 * 4)));
     run_well({"make", "point_load", "-o", "inputs/field.vdb", "--resolution", "9"});
-    for (const char* part : {"1", "2"})
-      run_well({"render", "inputs/scene.json", "-q", "--shard", std::string(part) + "/2", "-o",
-                "inputs/" + std::string(part) + ".shard"});
+    for (const std::string part : {"1", "2"})
+      run_well({"render", "inputs/scene.json", "-q", "--shard", part + "/2", "-o", "inputs/" + part + ".shard"});
   }
 
   Arguments arguments_of(const Command& command, const std::filesystem::path& results) const {
@@ -273,24 +248,15 @@ class Surroundings : public Program {
   }
 
   /// Runs a command to its end; a view ends when it has printed its address.
-  Outcome run_in(const Place& place, const Command& command, const std::filesystem::path& results) const {
+  Outcome run_at(const Place& place, const Command& command, const std::filesystem::path& results) const {
     std::filesystem::remove(in_folder("stdout"));  // That of another run has an address, too.
-    const pid_t child = start_in(place.shell, arguments_of(command, results));
+    const pid_t child = start(arguments_of(command, results), place.shell);
     if (std::string(command.name) == "view") {
-      while (is_running(child) && read_file(in_folder("stdout")).find("http://") == std::string::npos)
+      while (is_running(child) && contents("stdout").find("http://") == std::string::npos)
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
       kill(child, SIGTERM);
     }
     return wait_for(child);
-  }
-
-  static std::vector<std::string> names_in(const std::filesystem::path& folder) {
-    std::vector<std::string> names;
-    std::error_code none;
-    for (const auto& entry : std::filesystem::directory_iterator(folder, none))
-      names.push_back(entry.path().filename().string());
-    std::sort(names.begin(), names.end());
-    return names;
   }
 
   void expect_end(const Place& place, const Command& command) const {
@@ -300,21 +266,21 @@ class Surroundings : public Program {
     const std::filesystem::path results = in_folder("results"), into = (results / place.folder).lexically_normal();
     std::filesystem::remove_all(results);
     std::filesystem::create_directories(results);
-    if (std::string(place.folder) != "missing") std::filesystem::create_directories(into);
+    if (place.folder != "missing") std::filesystem::create_directories(into);
 
-    const Outcome outcome = run_in(place, command, into);
+    const Outcome outcome = run_at(place, command, into);
     EXPECT_EQ(outcome.status, end.status) << where << ": " << outcome.error;
-    if (end.status != 0 && place.shows_errors) {
+    if (end.status != 0 && end.line) {
       EXPECT_THAT(outcome.error, StartsWith("tensorray: ")) << where;
       expect_one_line(outcome, end.line, end.status);
     }
     std::vector<std::string> expected = end.status == 0 ? command.files : std::vector<std::string>();
-    std::vector<std::string> made = names_in(into);
+    std::vector<std::string> made = files("results/" + place.folder);
     made.erase(std::remove(made.begin(), made.end(), "a.stats"), made.end());
     EXPECT_EQ(made, expected) << where << ": " << outcome.error;
     if (end.status != 0) return;
     for (const std::string& file : command.files)
-      EXPECT_TRUE(read_file(into / file) == read_file(in_folder("reference/" + file))) << where << ": " << file;
+      EXPECT_TRUE(bytes_of(into / file) == contents("reference/" + file)) << where << ": " << file;
   }
 };
 
@@ -324,7 +290,7 @@ TEST_F(Surroundings, GiveTheResultOrOneLine) {
   std::filesystem::create_directories(in_folder("reference"));
   for (const Command& command : commands) {
     if (std::string(command.name) == "view" && !has_page) continue;  // tools/view builds it.
-    EXPECT_EQ(run_in({"here", "exec", {}}, command, in_folder("reference")).status, 0) << command.name;
+    EXPECT_EQ(run_at({"here", "exec", {}}, command, in_folder("reference")).status, 0) << command.name;
     for (const Place& place : places) expect_end(place, command);
   }
 }
