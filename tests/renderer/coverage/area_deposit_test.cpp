@@ -152,19 +152,19 @@ PlanarMesh grid(std::uint32_t cells, const std::function<Vector2d(const Vector2d
   return mesh;
 }
 
-struct Place {
+struct MeshSquare {
   const char* name;
   Vector2d offset;
   double scale;
 };
 
-const Place places[] = {{"unit square", {0, 0}, 1},
-                        {"far away", {1000, -1000}, 1},
-                        {"small", {3e-20, 0}, 1e-20},
-                        {"large", {0, 1e20}, 1e20}};
+const MeshSquare mesh_squares[] = {{"unit square", {0, 0}, 1},
+                                   {"far away", {1000, -1000}, 1},
+                                   {"small", {3e-20, 0}, 1e-20},
+                                   {"large", {0, 1e20}, 1e20}};
 
 /// A mesh of a square. Inner vertices are jittered, so that all triangles are different.
-PlanarMesh jittered(std::uint32_t cells, std::mt19937& random, const Place& square) {
+PlanarMesh jittered(std::uint32_t cells, std::mt19937& random, const MeshSquare& square) {
   return grid(cells, [&](Vector2d p) {
     for (double& coordinate : p)
       if (coordinate > 0 && coordinate < 1) coordinate += uniform(random, -0.2, 0.2) / cells;
@@ -247,10 +247,10 @@ TEST(PlanarMesh, AgreesWithBruteForceWhereTrianglesOverlap) {
 }
 
 TEST(PlanarMesh, PointsOnEdgesAndVerticesAreFoundInAllTrianglesThatShareThem) {
-  for (const Place& place : places) {
-    SCOPED_TRACE(place.name);
+  for (const MeshSquare& square : mesh_squares) {
+    SCOPED_TRACE(square.name);
     std::mt19937 random(3);
-    const PlanarMesh mesh = jittered(40, random, place);
+    const PlanarMesh mesh = jittered(40, random, square);
     const PlanarMeshSearch search(mesh);
     for (std::uint32_t vertex = 0; vertex < mesh.vertices.size(); ++vertex)
       ASSERT_EQ(found(search, mesh.vertices[vertex]), sharing(mesh, {vertex}));
@@ -264,23 +264,23 @@ TEST(PlanarMesh, PointsOnEdgesAndVerticesAreFoundInAllTrianglesThatShareThem) {
 }
 
 TEST(PlanarMesh, NoPointFallsBetweenTriangles) {
-  for (const Place& place : places) {
-    SCOPED_TRACE(place.name);
+  for (const MeshSquare& square : mesh_squares) {
+    SCOPED_TRACE(square.name);
     std::mt19937 random(4);
-    const PlanarMesh mesh = jittered(300, random, place);
+    const PlanarMesh mesh = jittered(300, random, square);
     const PlanarMeshSearch search(mesh);
-    const Vector2d center = place.offset + Vector2d::Constant(place.scale / 2);
+    const Vector2d center = square.offset + Vector2d::Constant(square.scale / 2);
     for (int i = 0; i < 50000; ++i) {
       const auto& triangle = mesh.triangles[random() % mesh.triangles.size()];
       const Vector2d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]];
       // Distance from an edge or a vertex, from below double precision to above single precision.
-      const double away = place.scale * std::pow(10, uniform(random, -18, -5)),
+      const double away = square.scale * std::pow(10, uniform(random, -18, -5)),
                    along = i % 3 ? uniform(random, 0, 1) : 0;
       Vector2d point = a + along * (b - a) + away * uniform(random, {-1, -1}, {1, 1});
       point = point.cwiseMax(mesh.vertices.front()).cwiseMin(mesh.vertices.back());
       const std::vector<PlanarHit> hits = hits_at(search, point);
       ASSERT_GE(hits.size(), 1u) << (point - center).transpose();
-      expect_weights(mesh, hits, point, 1e-14 * (center.norm() + place.scale));
+      expect_weights(mesh, hits, point, 1e-14 * (center.norm() + square.scale));
     }
   }
 }

@@ -52,14 +52,14 @@ class BendingPlane : public BendingRegion {
   double angle_, steeper_;
 };
 
-std::vector<Vector3d> corners() {
-  const Vector3d half(half_size, half_size, half_height);
-  return corners_of({-half, half});
+const std::vector<Vector3d> region_corners =
+    corners_of({Vector3d(-half_size, -half_size, -half_height), Vector3d(half_size, half_size, half_height)});
+
+AreaLight lamp_at(const Vector3d& place, const Vector2d& size) {
+  return {rectangle_mesh(place, {1, 0, 0}, {0, -1, 0}, size), {5, 7}};
 }
 
-AreaLight lamp() { return {rectangle_mesh({1.8, 0.2, 3}, {1, 0, 0}, {0, -1, 0}, {1.2, 0.9}), {5, 7}}; }
-
-AreaLight lamp_within() { return {rectangle_mesh({0.2, 0.2, 0.2}, {1, 0, 0}, {0, -1, 0}, {0.3, 0.2}), {5, 7}}; }
+const AreaLight outer_lamp = lamp_at({1.8, 0.2, 3}, {1.2, 0.9}), inner_lamp = lamp_at({0.2, 0.2, 0.2}, {0.3, 0.2});
 
 const TestBands& both_bands() {
   static const TestBands two({{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}});
@@ -69,7 +69,7 @@ const TestBands& both_bands() {
 /// A floor below the plane, a lamp above it, and the lamp's photons on the floor.
 struct Stage : World {
   Stage(const BendingRegion& region, const MaterialSettings& floor, std::uint64_t per_pass, int passes,
-        const AreaLight& light = lamp())
+        const AreaLight& light)
       : World(both_bands(),
               {surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8})), surface_of(light.mesh, 1, 0)},
               {make_material(floor, both_bands().grey(0.6)), make_material(Diffuse{}, both_bands().grey(0))}, {light}) {
@@ -80,7 +80,7 @@ struct Stage : World {
     settings.passes = passes;
     settings.radius = 0.12;
     settings.serves = [](int, std::uint32_t surface) { return surface == 0; };
-    photons = trace_photons(region, corners(), surfaces, light_list, settings, {});
+    photons = trace_photons(region, region_corners, surfaces, light_list, settings, {});
   }
 
   /// Radiance of a point of the floor in the second band. @param with_photons  Whether photons are a technique, too.
@@ -104,46 +104,49 @@ double by_photons_alone(const Stage& stage) {
   return 0.6 / pi * sum / static_cast<double>(stage.photons.passes.size());
 }
 
-MaterialSettings glossy() {
-  Principled material;
-  material.roughness = 0.3;
-  return material;
-}
+struct LampCase {
+  const char* name;
+  MaterialSettings floor;
+  double steeper;  ///< See BendingPlane.
+  AreaLight light;
+};
 
 /// Aim and material find the light with each other's weights or alone; each with photons and without. There are so few
 /// photons in each pass that no technique has all the weight. Their noise is common to all samples: without weights 7%
-/// of the light (by seeds), with them less.
+/// of the light (by seeds), with them less. Photons of a lamp within the region start in all directions, as it shines.
 TEST(AreaPhotonsTest, EverySubsetOfTechniquesHasTheSameMean) {
-  for (const MaterialSettings& floor : {MaterialSettings(Diffuse{}), glossy()})
-    for (const double steeper : {1.0, 1.6}) {
-      const bool is_diffuse = std::holds_alternative<Diffuse>(floor);
-      if (steeper == 1 && !is_diffuse) continue;
-      const BendingPlane plane(0.15, steeper), wrong(-0.15, 1 / steeper);
-      Stage stage(plane, floor, 300, 1024);
-      const Mean truth = stage.radiance(DirectLight::both, false);
-      EXPECT_LT(truth.error(), 0.03 * truth.mean());
-      for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material})
-        for (const bool with_photons : {false, true}) {
-          const Mean mean = stage.radiance(direct, with_photons);
-          const double noise = with_photons ? 0.05 * truth.mean() : 0;
-          EXPECT_NEAR(mean.mean(), truth.mean(), 4.5 * std::hypot(mean.error(), truth.error()) + noise)
-              << static_cast<int>(direct) << with_photons << " " << steeper;
-        }
-      if (is_diffuse) {
-        const double alone = by_photons_alone(Stage(plane, floor, 30000, 32));
-        EXPECT_NEAR(alone, truth.mean(), 4.5 * truth.error() + 0.06 * truth.mean()) << steeper;
+  Principled glossy;
+  glossy.roughness = 0.3;
+  for (const auto& [name, floor, steeper, light] : {LampCase{"turned", Diffuse{}, 1, outer_lamp},
+                                                    {"steeper", Diffuse{}, 1.6, outer_lamp},
+                                                    {"steeper, glossy", glossy, 1.6, outer_lamp},
+                                                    {"lamp within", Diffuse{}, 1.3, inner_lamp}}) {
+    SCOPED_TRACE(name);
+    const BendingPlane plane(0.15, steeper), wrong(-0.15, 1 / steeper);
+    Stage stage(plane, floor, 300, 1024, light);
+    const Mean truth = stage.radiance(DirectLight::both, false);
+    EXPECT_LT(truth.error(), 0.03 * truth.mean());
+    for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material})
+      for (const bool with_photons : {false, true}) {
+        const Mean mean = stage.radiance(direct, with_photons);
+        const double noise = with_photons ? 0.05 * truth.mean() : 0;
+        EXPECT_NEAR(mean.mean(), truth.mean(), 4.5 * std::hypot(mean.error(), truth.error()) + noise)
+            << static_cast<int>(direct) << with_photons;
       }
-      if (steeper == 1) continue;
-      // Photons that bend the wrong way do not add up with rays that bend the right way.
-      stage.photons = Stage(wrong, floor, 300, 1024).photons;
-      const double difference = stage.radiance(DirectLight::both, true).mean() - truth.mean();
-      EXPECT_GT(std::abs(difference), 0.15 * truth.mean());
+    if (std::holds_alternative<Diffuse>(floor)) {
+      const double alone = by_photons_alone(Stage(plane, floor, 30000, 32, light));
+      EXPECT_NEAR(alone, truth.mean(), 4.5 * truth.error() + 0.06 * truth.mean());
     }
+    // Photons that bend the wrong way do not add up with rays that bend the right way.
+    stage.photons = Stage(wrong, floor, 300, 1024, light).photons;
+    const double difference = stage.radiance(DirectLight::both, true).mean() - truth.mean();
+    EXPECT_GT(std::abs(difference), 0.15 * truth.mean());
+  }
 }
 
 TEST(AreaPhotonsTest, PhotonsRemoveNoiseWhereAimMisses) {
   const BendingPlane plane(0.8);
-  Stage stage(plane, Diffuse{}, 30000, 32);
+  Stage stage(plane, Diffuse{}, 30000, 32, outer_lamp);
   const Mean without = stage.radiance(DirectLight::both, false), with = stage.radiance(DirectLight::both, true);
   EXPECT_NEAR(with.mean(), without.mean(), 4.5 * without.error() + 0.06 * without.mean());
   EXPECT_LT(with.error(), 0.3 * without.error());
@@ -153,15 +156,12 @@ TEST(AreaPhotonsTest, PhotonsRemoveNoiseWhereAimMisses) {
 /// middle, radiance × area × ∫ cos θ dω.
 TEST(AreaPhotonsTest, PowerIsThatOfTheLampTowardsTheVolume) {
   const double height = 4, side = 0.02;
-  const std::vector<Light> lights{
-      AreaLight{rectangle_mesh({0, 0, height}, {1, 0, 0}, {0, -1, 0}, {side, side}), {5, 7}}};
-  std::vector<ShadedSurface> parts(1);
-  parts[0].shape = rectangle_mesh({0, 0, -2}, {1, 0, 0}, {0, 1, 0}, {400, 400});
-  const SurfaceScene floor(std::move(parts));
+  const std::vector<Light> lights{lamp_at({0, 0, height}, {side, side})};
+  const SurfaceScene floor({surface_of(rectangle_mesh({0, 0, -2}, {1, 0, 0}, {0, 1, 0}, {400, 400}))});
   PhotonTracerSettings settings;
   settings.per_pass = 40000;
   settings.serves = [](int, std::uint32_t) { return true; };
-  const PhotonMaps photons = trace_photons(BendingPlane(0.3), corners(), floor, lights, settings, {});
+  const PhotonMaps photons = trace_photons(BendingPlane(0.3), region_corners, floor, lights, settings, {});
   double power = 0;
   for (const Photon& photon : photons.passes[0].photons()) power += photon.band == 1 ? photon.power : 0;
   const double h = height - half_height, root = std::sqrt(half_size * half_size + h * h);
@@ -172,18 +172,7 @@ TEST(AreaPhotonsTest, PowerIsThatOfTheLampTowardsTheVolume) {
   EXPECT_EQ(ends[0] + ends[1] + ends[2] + ends[3], emitted);
   ASSERT_TRUE(photons.areas[0]);
   EXPECT_EQ(photons.areas[0]->count, 40000);
-}
-
-/// Photons of a lamp within the region start in all directions, as it shines.
-TEST(AreaPhotonsTest, ALampWithinTheRegionHasTheSameMeanByPhotons) {
-  const BendingPlane plane(0.15, 1.3);
-  Stage stage(plane, Diffuse{}, 300, 1024, lamp_within());
-  const Mean truth = stage.radiance(DirectLight::both, false), with = stage.radiance(DirectLight::both, true);
-  EXPECT_LT(truth.error(), 0.03 * truth.mean());
-  EXPECT_NEAR(with.mean(), truth.mean(), 4.5 * std::hypot(with.error(), truth.error()) + 0.05 * truth.mean());
-  const Stage many(plane, Diffuse{}, 30000, 32, lamp_within());
-  EXPECT_NEAR(by_photons_alone(many), truth.mean(), 4.5 * truth.error() + 0.06 * truth.mean());
-  EXPECT_DOUBLE_EQ(PhotonEmitter(lamp_within(), corners(), {}).power(), pi * 0.3 * 0.2);
+  EXPECT_DOUBLE_EQ(PhotonEmitter(inner_lamp, region_corners, {}).power(), pi * 0.3 * 0.2);
 }
 
 }  // namespace

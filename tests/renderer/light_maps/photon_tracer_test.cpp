@@ -43,9 +43,8 @@ class ClearCube : public BendingRegion {
 
 /// A floor at `height`, of a size, and perhaps a roof above everything.
 SurfaceScene floor_at(double height, double size, bool roof = false) {
-  std::vector<ShadedSurface> surfaces(roof ? 2 : 1);
-  surfaces[0].shape = rectangle_mesh({0, 0, height}, {1, 0, 0}, {0, 1, 0}, {size, size});
-  if (roof) surfaces[1].shape = rectangle_mesh({0.25, 0, 0.8}, {1, 0, 0}, {0, 1, 0}, {0.5, 4});
+  std::vector<ShadedSurface> surfaces{surface_of(rectangle_mesh({0, 0, height}, {1, 0, 0}, {0, 1, 0}, {size, size}))};
+  if (roof) surfaces.push_back(surface_of(rectangle_mesh({0.25, 0, 0.8}, {1, 0, 0}, {0, 1, 0}, {0.5, 4})));
   return SurfaceScene(std::move(surfaces));
 }
 
@@ -62,9 +61,14 @@ PhotonTracerSettings settings_of(std::uint64_t per_pass, int passes = 1, double 
 }
 
 PhotonMaps traced(const BendingRegion& region, const SurfaceScene& surfaces, const std::vector<Light>& lights,
-                  const PhotonTracerSettings& settings) {
+                  const PhotonTracerSettings& settings, const Progress& progress = {}) {
   return trace_photons(region, corners_of({Vector3d::Constant(-0.5), Vector3d::Constant(0.5)}), surfaces, lights,
-                       settings, {});
+                       settings, progress);
+}
+
+/// The part of the photons that end there.
+double part_of(const PhotonCounts& counts, PhotonEnd end) {
+  return static_cast<double>(counts.ends[static_cast<std::size_t>(end)]) / static_cast<double>(counts.emitted);
 }
 
 SurfaceHit floor_point(const SurfaceScene& surfaces, double x, double y) {
@@ -143,9 +147,7 @@ TEST(PhotonTracerTest, IsCancelledBetweenPhotons) {
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   Progress progress;
   const CancellingCube cube(progress);
-  EXPECT_THROW(trace_photons(cube, corners_of({Vector3d::Constant(-0.5), Vector3d::Constant(0.5)}), floor_at(-0.8, 4),
-                             {sun({0, 0, -1})}, settings_of(4000), progress),
-               Cancelled);
+  EXPECT_THROW(traced(cube, floor_at(-0.8, 4), {sun({0, 0, -1})}, settings_of(4000), progress), Cancelled);
   EXPECT_EQ(cube.positions, 10);
 }
 
@@ -158,14 +160,11 @@ TEST(PhotonTracerTest, EveryPhotonEnds) {
     EXPECT_EQ(counts.emitted, 4000u * traced_bands);
     EXPECT_EQ(std::accumulate(counts.ends.begin(), counts.ends.end(), std::uint64_t{0}), counts.emitted);
   }
-  const auto part = [&](PhotonEnd end) {
-    return static_cast<double>(photons.counts[0].ends[static_cast<std::size_t>(end)]) / (4000.0 * traced_bands);
-  };
-  EXPECT_NEAR(part(PhotonEnd::before), 0.5, 0.02);  // The roof, at x > 0; the rest is stopped.
-  EXPECT_NEAR(part(PhotonEnd::stopped), 0.5, 0.02);
+  EXPECT_NEAR(part_of(photons.counts[0], PhotonEnd::before), 0.5, 0.02);  // The roof, at x > 0; the rest is stopped.
+  EXPECT_NEAR(part_of(photons.counts[0], PhotonEnd::stopped), 0.5, 0.02);
   const PhotonMaps open = traced(ClearCube(), floor_at(-0.8, 0.5), {sun({0, 0, -1})}, settings_of(4000));
-  EXPECT_NEAR(static_cast<double>(open.counts[0].ends[1]) / (4000.0 * traced_bands), 0.25, 0.01);
-  EXPECT_NEAR(static_cast<double>(open.counts[0].ends[2]) / (4000.0 * traced_bands), 0.75, 0.01);
+  EXPECT_NEAR(part_of(open.counts[0], PhotonEnd::landed), 0.25, 0.01);
+  EXPECT_NEAR(part_of(open.counts[0], PhotonEnd::escaped), 0.75, 0.01);
 }
 
 TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
@@ -219,15 +218,8 @@ TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
   ShadedScene bent = world.scene;
   bent.region = &cube;
   bent.photons = &photons;
-  const auto mean_of = [&](const ShadedScene& scene, double x) {
-    RayShader shader(scene, {});
-    Mean mean;
-    for (std::uint32_t i = 0; i < 16 * 8; ++i) {
-      const Vector3d from(x, -3, 1);
-      shader.shade({{from, (Vector3d(x, 0.05, -0.8) - from).normalized(), {3, 7, i, 0}}}, true);
-      mean.add(shader.radiance(0)[1]);
-    }
-    return mean;
+  const auto mean_of = [](const ShadedScene& scene, double x) {
+    return seen(scene, {}, {x, -3, 1}, {x, 0.05, -0.8}, 2000, 1);
   };
   const Mean with = mean_of(bent, 0.1), without = mean_of(world.scene, 0.1), beside = mean_of(bent, 2);
   EXPECT_NEAR(with.mean(), without.mean(), 0.03 * without.mean());
@@ -270,15 +262,13 @@ TEST(PhotonTracerTest, VisitsAllPhotonsInReach) {
 /// (1 − cos θ) / 2 of the photons, where θ is the angle of its inscribed circle, or a little more. The radius blurs by
 /// half a percent.
 TEST(PhotonTracerTest, APointWithinTheRegionShinesAllAround) {
-  constexpr double size = 40;
-  constexpr std::uint64_t count = 60000;
   for (const double z : {0.2, 0.505}) {
     const PointLight point{{0.1, 0, z}, {5, 7}};
-    const double height = z + 0.8, part = (1 - height / std::hypot(height, size / 2)) / 2;
-    const SurfaceScene floor = floor_at(-0.8, size);
-    const PhotonMaps photons = traced(ClearCube(), floor, {point}, settings_of(count, 8, 0.1));
-    const double landed = static_cast<double>(photons.counts[0].ends[static_cast<std::size_t>(PhotonEnd::landed)]) /
-                          static_cast<double>(count * traced_bands);
+    const double height = z + 0.8, part = (1 - height / std::hypot(height, 40 / 2)) / 2;
+    const SurfaceScene floor = floor_at(-0.8, 40);
+    const PhotonMaps photons = traced(ClearCube(), floor, {point}, settings_of(60000, 8, 0.1));
+    EXPECT_EQ(photons.counts[0].emitted, 60000u * traced_bands);
+    const double landed = part_of(photons.counts[0], PhotonEnd::landed);
     if (z < 0.5) {  // From above, light that passes the cube is left to others.
       EXPECT_GT(landed, part - 0.006);
       EXPECT_LT(landed, 0.5);

@@ -21,27 +21,21 @@ class TurningBall : public BendingRegion {
     return half > 0 && along + std::sqrt(half) > 1e-9 ? std::max(0.0, along - std::sqrt(half)) : INFINITY;
   }
 
-  void trace_radiance(std::vector<BentRay>& rays) const override {
+  void trace_radiance(std::vector<BentRay>& rays) const override { turn(rays, angle_); }
+  void trace_importance(std::vector<BentRay>& rays) const override { turn(rays, -angle_); }
+
+  int lost_band = -1;  ///< Its light does not arrive.
+
+ private:
+  void turn(std::vector<BentRay>& rays, double angle) const {
     for (BentRay& ray : rays) {
       ray.position += entry(ray.position, ray.direction) * ray.direction;
-      ray.direction = Eigen::AngleAxisd(angle_ * (1 + ray.band), Vector3d::UnitZ()) * ray.direction;
+      ray.direction = Eigen::AngleAxisd(angle * (1 + ray.band), Vector3d::UnitZ()) * ray.direction;
       ray.arrives = ray.band != lost_band;
       ray.radiance_scale = radiance_scale_;
     }
   }
 
-  /// Light that passes the ball at its centre height turns back.
-  void trace_importance(std::vector<BentRay>& rays) const override {
-    for (BentRay& ray : rays) {
-      ray.position += entry(ray.position, ray.direction) * ray.direction;
-      ray.direction = Eigen::AngleAxisd(-angle_ * (1 + ray.band), Vector3d::UnitZ()) * ray.direction;
-      ray.arrives = true;
-    }
-  }
-
-  int lost_band = -1;  ///< Its light does not arrive.
-
- private:
   double angle_, radiance_scale_;
 };
 
@@ -55,12 +49,14 @@ const TestBands& four_bands() {
 
 std::vector<float> even_reflectance(float value) { return four_bands().even(value); }
 
-/// A floor below the ball, lit by `lights`, of which the first may be the area light of a lamp.
+/// A floor below a ball, lit by `lights`, of which the first may be the area light of a lamp.
 struct RegionStage : World {
-  explicit RegionStage(const std::vector<Light>& all_lights, double albedo = 0.6)
+  RegionStage(const TurningBall& ball, const std::vector<Light>& all_lights, double albedo = 0.6)
       : World(four_bands(), parts(all_lights),
               {make_material(Diffuse{}, four_bands().grey(albedo)), make_material(Diffuse{}, four_bands().grey(0))},
-              all_lights) {}
+              all_lights) {
+    scene.region = &ball;
+  }
 
   static std::vector<ShadedSurface> parts(const std::vector<Light>& lights) {
     std::vector<ShadedSurface> result{surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8}))};
@@ -74,11 +70,9 @@ AreaLight region_lamp() {
 }
 
 TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
-  RegionStage stage({ConstantLight{even_reflectance(1)}}, 1);
   const TurningBall ball(0.3);
-  stage.scene.region = &ball;
-  stage.scene.bands_per_view = 4;
-  stage.scene.bands_per_bounce = 4;
+  RegionStage stage(ball, {ConstantLight{even_reflectance(1)}}, 1);
+  stage.scene.bands_per_view = stage.scene.bands_per_bounce = region_bands;
   for (const Vector3d& to : {Vector3d(0, 0, 0), Vector3d(0.1, 0, -0.8), Vector3d(0.9, 0.4, -0.8)}) {
     const Mean mean = seen(stage.scene, {}, {0, -3, 1.5}, to, 4000);
     EXPECT_NEAR(mean.mean(), 1, 5 * mean.error() + 1e-9);
@@ -86,9 +80,8 @@ TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
 }
 
 TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
-  RegionStage stage({region_lamp(), ConstantLight{even_reflectance(0.2f)}});
   const TurningBall ball(0.4, 1.5);
-  stage.scene.region = &ball;
+  RegionStage stage(ball, {region_lamp(), ConstantLight{even_reflectance(0.2f)}});
   std::vector<Mean> means;
   for (const int count : {1, 2, 4}) {
     stage.scene.bands_per_view = stage.scene.bands_per_bounce = count;
@@ -99,9 +92,8 @@ TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
 }
 
 TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
-  RegionStage stage({region_lamp(), ConstantLight{even_reflectance(0.2f)}});
   const TurningBall ball(0.4, 1.5);
-  stage.scene.region = &ball;
+  RegionStage stage(ball, {region_lamp(), ConstantLight{even_reflectance(0.2f)}});
   stage.scene.bands_per_view = 2;
   stage.scene.group_of_light = {0, 1};
   stage.scene.groups = 2;
@@ -134,10 +126,9 @@ TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
 
 /// Rays that do not arrive count as 0 in the sums, and not in the means.
 TEST(BendingRegionTest, MeansAreOfTheRaysThatArrive) {
-  RegionStage stage({ConstantLight{even_reflectance(1)}});
   TurningBall ball(0.01, 1.5);
   ball.lost_band = 3;
-  stage.scene.region = &ball;
+  RegionStage stage(ball, {ConstantLight{even_reflectance(1)}});
   stage.scene.bands_per_view = region_bands;
   RayShader shader(stage.scene, {});
   shader.shade({{{0, -3, 0}, {0, 1, 0}, {3, 0, 0, 0}}}, true);
@@ -151,9 +142,8 @@ TEST(BendingRegionTest, MeansAreOfTheRaysThatArrive) {
 TEST(BendingRegionTest, AnIrradianceMapReplacesTheSunBehindTheRegion) {
   DirectionalLight sun;
   sun.irradiance = even_reflectance(2);
-  RegionStage stage({sun});
   const TurningBall ball(0.1);
-  stage.scene.region = &ball;
+  RegionStage stage(ball, {sun});
   const auto radiance = [&](const Vector3d& to) { return seen(stage.scene, {}, {0, -3, 1}, to, 100).mean(); };
   const Vector3d below(0.1, 0.1, -0.8), beside(0.9, 0.1, -0.8);
   EXPECT_EQ(radiance(below), 0);
