@@ -56,6 +56,7 @@ class Mean {
     mean_ += change / count_;
     squares_ += change * (value - mean_);
   }
+  double count() const { return count_; }
   double mean() const { return mean_; }
   double error() const { return std::sqrt(squares_ / (count_ - 1) / count_); }
 
