@@ -41,7 +41,12 @@ inline ShadedSurface sphere(int rings) {
 }
 
 /// That a closed mesh encloses; positive if its triangles face outwards.
-inline double volume(const TriangleMesh& mesh) { return mesh.volume(); }
+inline double volume(const TriangleMesh& mesh) {
+  double sum = 0;
+  for (const auto& t : mesh.triangles)
+    sum += mesh.vertices[t[0]].dot(mesh.vertices[t[1]].cross(mesh.vertices[t[2]])) / 6;
+  return sum;
+}
 
 /// Distance at which a straight ray enters a box about the origin: 0 if it starts inside, infinite if it misses it.
 inline double box_entry(const Vector3d& half_size, const Vector3d& origin, const Vector3d& direction) {
