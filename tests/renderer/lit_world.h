@@ -30,6 +30,11 @@ struct TestBands {
   ReflectanceTable colors;
 };
 
+inline const TestBands& two_bands() {
+  static const TestBands two({{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}});
+  return two;
+}
+
 /// A scene and the objects that it refers to.
 struct World {
   World(const TestBands& bands, std::vector<ShadedSurface> parts, std::vector<Material> materials_,
@@ -58,6 +63,17 @@ inline Mean seen(const ShadedScene& scene, const ShadingSettings& settings, cons
   for (std::uint64_t i = 0; i < samples; ++i) {
     shader.shade({{from, (to - from).normalized(), {11, i, 0, 0}}}, true);
     mean.add(band < 0 ? shader.radiance(0).mean() : shader.radiance(0)[band]);
+  }
+  return mean;
+}
+
+/// Irradiance of a point in a band; the mean over the passes.
+inline Mean photon_irradiance(const PhotonMaps& photons, const SurfaceHit& point, int band) {
+  Mean mean;
+  for (const PhotonMap& pass : photons.passes) {
+    double sum = 0;
+    pass.visit(point, band, [&](const Photon& photon, double density) { sum += photon.power * density; });
+    mean.add(sum);
   }
   return mean;
 }

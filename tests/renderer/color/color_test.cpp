@@ -52,15 +52,18 @@ displays:
   Screen:
     - !<View> {name: Curve, colorspace: curve}
     - !<View> {name: Plain, colorspace: linear}
+    - !<View> {name: Grey, view_transform: Plain, display_colorspace: grey}
 view_transforms:
   - !<ViewTransform>
     name: Plain
     from_scene_reference: !<BuiltinTransform> {style: UTILITY - ACES-AP0_to_CIE-XYZ-D65_BFD}
 display_colorspaces:
   - !<ColorSpace> {name: xyz}
-colorspaces:
   - !<ColorSpace>
-    name: aces
+    name: grey
+    from_display_reference: !<MatrixTransform> {matrix: [0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1]}
+colorspaces:
+  - !<ColorSpace> {name: aces}
   - !<ColorSpace> {name: linear, to_scene_reference: !<BuiltinTransform> {style: ACEScg_to_ACES2065-1}}
   - !<ColorSpace>
     name: curve
@@ -230,15 +233,7 @@ TEST_F(ColorTest, UnknownNamesListTheKnownOnes) {
 }
 
 TEST_F(ColorTest, DisplaysWithoutAnInverseAreShownButNotStated) {
-  std::string text = config_text(linear_role + aces_role + xyz_role);
-  const auto insert = [&](const std::string& before, const std::string& addition) {
-    text.insert(text.find(before), addition);
-  };
-  insert("    - !<View> {name: Curve", "    - !<View> {name: Grey, view_transform: Plain, display_colorspace: grey}\n");
-  insert("colorspaces:\n  - !<ColorSpace>\n    name: aces",
-         "  - !<ColorSpace>\n    name: grey\n    from_display_reference: !<MatrixTransform> "
-         "{matrix: [0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1]}\n");
-  const ColorManagement color = color_of(text, "Screen", "Grey");
+  const ColorManagement color = color_of(config_text(linear_role + aces_role + xyz_role), "Screen", "Grey");
   EXPECT_NEAR(displayed_grey(color, 0.5f), 0.5, 1e-3);
   EXPECT_FALSE(color.display_encoding().is_srgb);
   EXPECT_EQ(color.display_encoding().icc_profile, "");
@@ -288,11 +283,9 @@ TEST_F(ColorTest, TextureSpacesOfConfigs) {
   EXPECT_THAT(message([&] { without.texture_space("a.png", true, ""); }),
               AllOf(HasSubstr(without.config_name()), HasSubstr("a.png"), HasSubstr("integrator.image_color_space")));
   EXPECT_EQ(color_of(text + "    aliases: [srgb_tx]\n").texture_space("a.png", true, ""), "srgb_tx");
+  const std::string scans = "  - !<Rule> {name: scans, colorspace: curve, pattern: \"*scan*\", extension: \"*\"}\n";
   std::string ruled = text;
-  const std::string rules = "file_rules:\n";
-  ruled.insert(ruled.find(rules) + rules.size(),
-               "  - !<Rule> {name: scans, colorspace: curve, pattern: \"*scan*\", extension: \"*\"}\n");
-  const ColorManagement with = color_of(ruled);
+  const ColorManagement with = color_of(ruled.insert(ruled.find("  - !<Rule>"), scans));
   EXPECT_EQ(with.texture_space("/x/my_scan_1.png", true, ""), "curve");
   EXPECT_EQ(with.texture_space("/x/my_scan_1.exr", false, ""), "curve");
   EXPECT_EQ(with.texture_space("/x/my_scan_1.png", true, "aces"), "aces");

@@ -22,10 +22,7 @@ class BendingPlane : public BendingRegion {
   }
 
   void trace_radiance(std::vector<BentRay>& rays) const override {
-    for (BentRay& ray : rays) {
-      bend(-1, ray);
-      ray.radiance_scale = ray.jacobian;
-    }
+    for (BentRay& ray : rays) bend(-1, ray);
   }
 
   void trace_importance(std::vector<BentRay>& rays) const override {
@@ -47,6 +44,7 @@ class BendingPlane : public BendingRegion {
     ray.position = crossing;
     const double volume = slope * slope * std::pow(ray.direction.z() / before, 4);  // Of phase space, by that before.
     ray.jacobian = sign > 0 ? 1 / volume : volume;
+    if (sign < 0) ray.radiance_scale = ray.jacobian;
   }
 
   double angle_, steeper_;
@@ -61,18 +59,13 @@ AreaLight lamp_at(const Vector3d& place, const Vector2d& size) {
 
 const AreaLight outer_lamp = lamp_at({1.8, 0.2, 3}, {1.2, 0.9}), inner_lamp = lamp_at({0.2, 0.2, 0.2}, {0.3, 0.2});
 
-const TestBands& both_bands() {
-  static const TestBands two({{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}});
-  return two;
-}
-
 /// A floor below the plane, a lamp above it, and the lamp's photons on the floor.
 struct Stage : World {
   Stage(const BendingRegion& region, const MaterialSettings& floor, std::uint64_t per_pass, int passes,
         const AreaLight& light)
-      : World(both_bands(),
+      : World(two_bands(),
               {surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8})), surface_of(light.mesh, 1, 0)},
-              {make_material(floor, both_bands().grey(0.6)), make_material(Diffuse{}, both_bands().grey(0))}, {light}) {
+              {make_material(floor, two_bands().grey(0.6)), make_material(Diffuse{}, two_bands().grey(0))}, {light}) {
     scene.region = &region;
     scene.bands_per_view = scene.bands_per_bounce = 2;
     PhotonTracerSettings settings;
@@ -98,10 +91,7 @@ struct Stage : World {
 /// Of a diffuse floor, all photons together, without weights.
 double by_photons_alone(const Stage& stage) {
   const auto point = *stage.surfaces.intersect({0.3, -0.1, -0.5}, {0, 0, -1});
-  double sum = 0;
-  for (const PhotonMap& pass : stage.photons.passes)
-    pass.visit(point, 1, [&](const Photon& photon, double density) { sum += photon.power * density; });
-  return 0.6 / pi * sum / static_cast<double>(stage.photons.passes.size());
+  return 0.6 / pi * photon_irradiance(stage.photons, point, 1).mean();
 }
 
 struct LampCase {

@@ -75,17 +75,6 @@ SurfaceHit floor_point(const SurfaceScene& surfaces, double x, double y) {
   return *surfaces.intersect({x, y, 0.49}, {0, 0, -1});
 }
 
-/// Irradiance of a point in a band; the mean over the passes.
-Mean irradiance(const PhotonMaps& photons, const SurfaceHit& point, int band) {
-  Mean mean;
-  for (const PhotonMap& pass : photons.passes) {
-    double sum = 0;
-    pass.visit(point, band, [&](const Photon& photon, double density) { sum += photon.power * density; });
-    mean.add(sum);
-  }
-  return mean;
-}
-
 double power_in(const PhotonMaps& photons, int band) {
   double sum = 0;
   for (const PhotonMap& pass : photons.passes)
@@ -180,7 +169,7 @@ TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
                                                       {point, 7 * -way.z() / std::pow(way.norm(), 3)}};
     for (std::size_t i = 0; i < cases.size(); ++i) {
       const PhotonMaps photons = traced(ClearCube(), floor, {cases[i].first}, settings_of(4000, 32, 0.1));
-      const Mean mean = irradiance(photons, at, 1);
+      const Mean mean = photon_irradiance(photons, at, 1);
       EXPECT_NEAR(mean.mean(), cases[i].second, 5 * mean.error()) << i << " " << height;
       EXPECT_LT(mean.error(), 0.04 * cases[i].second) << i;
     }
@@ -194,7 +183,7 @@ TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
     const PhotonMaps photons = traced(ClearCube(), floor, {sun({0, 0, -1})}, settings);
     Mean mean;
     for (int i = 0; i < 1600; ++i)
-      mean.add(irradiance(photons, floor_point(floor, (i % 40 - 19.5) / 80, (i / 40 - 19.5) / 80), 0).mean());
+      mean.add(photon_irradiance(photons, floor_point(floor, (i % 40 - 19.5) / 80, (i / 40 - 19.5) / 80), 0).mean());
     return mean.mean();
   };
   EXPECT_LT(mean_on_plate(), 0.9 * 2);
@@ -209,9 +198,8 @@ TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
 
 /// The shading of photons is that of next-event estimation where nothing bends: one or the other, never both.
 TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
-  const TestBands both({{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}});
-  const World world(both, {surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8}))},
-                    {make_material(Diffuse{}, both.grey(0.6))},
+  const World world(two_bands(), {surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8}))},
+                    {make_material(Diffuse{}, two_bands().grey(0.6))},
                     {sun({0.2, -0.1, -1}), PointLight{{0.3, 0.2, 2}, {5, 7}}});
   const ClearCube cube;
   const PhotonMaps photons = traced(cube, world.surfaces, world.light_list, settings_of(4000, 16, 0.1));
@@ -275,7 +263,7 @@ TEST(PhotonTracerTest, APointWithinTheRegionShinesAllAround) {
     }
     for (const double x : {0.1, 0.4}) {
       const double squared = height * height + (x - 0.1) * (x - 0.1);
-      const Mean found = irradiance(photons, floor_point(floor, x, 0), 1);
+      const Mean found = photon_irradiance(photons, floor_point(floor, x, 0), 1);
       EXPECT_NEAR(found.mean(), 7 * height / std::pow(squared, 1.5), 4.5 * found.error() + 0.01 * found.mean()) << z;
     }
   }
