@@ -184,6 +184,7 @@ class PictureTest : public ::testing::Test {
  protected:
   const World world = still_life();
   PathTracerSettings settings;
+  RenderCallbacks callbacks;
 };
 
 Camera camera(int size) { return perspective_camera({0, -6, 1}, {0, 0, 0}, {0, 0, 1}, 30, {size, size}); }
@@ -208,7 +209,6 @@ TEST_F(PictureTest, TimeLimitsTheSamples) {
   settings.max_seconds = 0;
   Job shard({1, 2});
   shard.is_shard = true;
-  RenderCallbacks callbacks;
   callbacks.job = &shard;
   const SurfacePicture part = render_surfaces(world.scene, camera(20), settings, callbacks);
   EXPECT_EQ(shard.results().size(), 2u);
@@ -226,7 +226,6 @@ TEST_F(PictureTest, KeepsBandsWhereTheyAreWanted) {
   for (const bool is_shard : {false, true}) {
     Job job;
     job.is_shard = is_shard;
-    RenderCallbacks callbacks;
     callbacks.job = &job;
     settings.spectral = false;
     EXPECT_TRUE(render_surfaces(world.scene, camera(20), settings, callbacks).radiance.values.empty());
@@ -248,7 +247,6 @@ TEST_F(PictureTest, IsCancelledWithinATile) {
   settings.min_samples = settings.max_samples = 1 << 20;
   std::atomic<bool> cancelled{false};
   Job job;
-  RenderCallbacks callbacks;
   callbacks.cancelled = &cancelled;
   callbacks.job = &job;
   callbacks.progress = [&](std::uint64_t, std::uint64_t) { job.stopping = true; };
@@ -269,17 +267,15 @@ TEST_F(PictureTest, AdaptiveSamplingKeepsTheMeanAndWorksWhereItIsNoisy) {
   settings.seed = 1;
   const SurfacePicture adaptive = render_surfaces(world.scene, camera(32), settings);
   const auto sum = [](const auto& values) { return std::accumulate(values.begin(), values.end(), 0.0); };
-  const auto variance = [](const SurfacePicture& picture) {
-    double all = 0;
-    for (const PixelState& pixel : picture.pixels) all += pixel.variance();
-    return all;
-  };
   const double samples = sum(samples_of(adaptive)), pixels = 32 * 32;
   EXPECT_LT(samples, 0.7 * 128 * pixels);
   EXPECT_GT(samples, 17 * pixels);
   // Error of the mean over the picture, from the variances of the pixels (of the luminance, which is nearly common to
   // all bands).
-  const double error = std::sqrt(variance(full) + variance(adaptive)) / pixels;
+  double variance = 0;
+  for (const SurfacePicture* picture : {&full, &adaptive})
+    for (const PixelState& pixel : picture->pixels) variance += pixel.variance();
+  const double error = std::sqrt(variance) / pixels;
   EXPECT_NEAR(sum(adaptive.radiance.values) / pixels / 3, sum(full.radiance.values) / pixels / 3, 5 * error);
 
   Mean many, few;  // Noise of pixels with many samples and with few.

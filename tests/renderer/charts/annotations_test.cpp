@@ -89,8 +89,7 @@ TEST(AnnotationsTest, AxesPointAsThePictureShowsThem) {
 /// Legends with short words, one or two, are beside the picture and cover none of it. The room is even.
 TEST(AnnotationsTest, RoomIsForALegendAndLeavesThePicture) {
   for (const auto& [width, height] : {std::pair(200, 200), {512, 512}, {200, 900}, {1920, 1080}, {24, 16}}) {
-    Image image = blank(width, height, 0.6f);
-    const Image with_room = with_room_beside(image);
+    const Image with_room = with_room_beside(blank(width, height, 0.6f));
     Image wide = with_room;
     for (const std::size_t part : {0, 1})
       draw_color_bar(wide, {"largest\n1/mm", {0, 0.0123}, [](double) { return Vector3d(1, 0, 0); }}, {part, 2});

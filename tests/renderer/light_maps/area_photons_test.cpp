@@ -60,20 +60,12 @@ AreaLight lamp_at(const Vector3d& place, const Vector2d& size) {
 const AreaLight outer_lamp = lamp_at({1.8, 0.2, 3}, {1.2, 0.9}), inner_lamp = lamp_at({0.2, 0.2, 0.2}, {0.3, 0.2});
 
 /// A floor below the plane, a lamp above it, and the lamp's photons on the floor.
-struct Stage : World {
+struct Stage : FloorWorld {
   Stage(const BendingRegion& region, const MaterialSettings& floor, std::uint64_t per_pass, int passes,
         const AreaLight& light)
-      : World(two_bands(),
-              {surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8})), surface_of(light.mesh, 1, 0)},
-              {make_material(floor, two_bands().grey(0.6)), make_material(Diffuse{}, two_bands().grey(0))}, {light}) {
-    scene.region = &region;
-    scene.bands_per_view = scene.bands_per_bounce = 2;
-    PhotonTracerSettings settings;
-    settings.per_pass = per_pass;
-    settings.passes = passes;
-    settings.radius = 0.12;
-    settings.serves = [](int, std::uint32_t surface) { return surface == 0; };
-    photons = trace_photons(region, region_corners, surfaces, light_list, settings, {});
+      : FloorWorld(two_bands(), region, floor, 0.6, {light}) {
+    scene.bands_per_view = scene.bands_per_bounce = bands;
+    photons = trace_photons(region, region_corners, surfaces, light_list, photon_settings(per_pass, passes, 0.12), {});
   }
 
   /// Radiance of a point of the floor in the second band. @param with_photons  Whether photons are a technique, too.
@@ -149,10 +141,8 @@ TEST(AreaPhotonsTest, PowerIsThatOfTheLampTowardsTheVolume) {
   const double height = 4, side = 0.02;
   const std::vector<Light> lights{lamp_at({0, 0, height}, {side, side})};
   const SurfaceScene floor({surface_of(rectangle_mesh({0, 0, -2}, {1, 0, 0}, {0, 1, 0}, {400, 400}))});
-  PhotonTracerSettings settings;
-  settings.per_pass = 40000;
-  settings.serves = [](int, std::uint32_t) { return true; };
-  const PhotonMaps photons = trace_photons(BendingPlane(0.3), region_corners, floor, lights, settings, {});
+  const PhotonMaps photons =
+      trace_photons(BendingPlane(0.3), region_corners, floor, lights, photon_settings(40000), {});
   double power = 0;
   for (const Photon& photon : photons.passes[0].photons()) power += photon.band == 1 ? photon.power : 0;
   const double h = height - half_height, root = std::sqrt(half_size * half_size + h * h);

@@ -1,6 +1,5 @@
 #include "renderer/light_maps/photon_tracer.h"
 
-#include <atomic>
 #include <numeric>
 
 #include <tbb/global_control.h>
@@ -17,30 +16,6 @@ namespace {
 
 constexpr int traced_bands = 2;
 
-/// The cube [−½, ½]³, which bends nothing, but changes the power of photons. It stops light in its middle on request.
-class ClearCube : public BendingRegion {
- public:
-  explicit ClearCube(double radiance_scale = 1, bool stops = false) : radiance_scale_(radiance_scale), stops_(stops) {}
-
-  double entry(const Vector3d& origin, const Vector3d& direction) const override {
-    return box_entry(Vector3d::Constant(0.5), origin, direction);
-  }
-
-  void trace_radiance(std::vector<BentRay>& rays) const override { trace_importance(rays); }
-
-  void trace_importance(std::vector<BentRay>& rays) const override {
-    for (BentRay& ray : rays) {
-      ray.position += entry(ray.position, ray.direction) * ray.direction;
-      ray.arrives = !stops_ || ray.position.x() > 0;
-      ray.radiance_scale = radiance_scale_;
-    }
-  }
-
- private:
-  double radiance_scale_;
-  bool stops_;
-};
-
 /// A floor at `height`, of a size, and perhaps a roof above everything.
 SurfaceScene floor_at(double height, double size, bool roof = false) {
   std::vector<ShadedSurface> surfaces{surface_of(rectangle_mesh({0, 0, height}, {1, 0, 0}, {0, 1, 0}, {size, size}))};
@@ -49,16 +24,6 @@ SurfaceScene floor_at(double height, double size, bool roof = false) {
 }
 
 DirectionalLight sun(const Vector3d& direction, double angle = 0) { return {direction, {2, 3}, angle}; }
-
-PhotonTracerSettings settings_of(std::uint64_t per_pass, int passes = 1, double radius = 0.05) {
-  PhotonTracerSettings settings;
-  settings.per_pass = per_pass;
-  settings.passes = passes;
-  settings.radius = radius;
-  settings.seed = 4;
-  settings.serves = [](int, std::uint32_t surface) { return surface == 0; };
-  return settings;
-}
 
 PhotonMaps traced(const BendingRegion& region, const SurfaceScene& surfaces, const std::vector<Light>& lights,
                   const PhotonTracerSettings& settings, const Progress& progress = {}) {
@@ -87,7 +52,7 @@ TEST(PhotonTracerTest, TheSunsPowerIsThatOfTheSilhouette) {
   const SurfaceScene floor = floor_at(-0.8, 40);
   const Vector3d direction = Vector3d(0.4, 0.3, -1).normalized();
   const double silhouette = direction.cwiseAbs().sum();
-  const PhotonMaps photons = traced(ClearCube(0.5), floor, {sun(3 * direction)}, settings_of(1000, 2));
+  const PhotonMaps photons = traced(TurningCube(0, 0.5), floor, {sun(3 * direction)}, photon_settings(1000, 2));
   EXPECT_EQ(photons.counts, std::vector<PhotonCounts>(2, {1000 * traced_bands, {0, 1000 * traced_bands, 0, 0}}));
   EXPECT_NEAR(power_in(photons, 0), 0.5 * 2 * silhouette, 1e-6);
   EXPECT_NEAR(power_in(photons, 1), 0.5 * 3 * silhouette, 1e-6);
@@ -96,13 +61,13 @@ TEST(PhotonTracerTest, TheSunsPowerIsThatOfTheSilhouette) {
 /// A band, a surface or a light that is not there would be an index beyond all memory.
 TEST(PhotonTracerTest, KeptPhotonsThatAreNoneAreRefused) {
   const SurfaceScene floor = floor_at(-0.8, 40);
-  PhotonTracerSettings settings = settings_of(100);
+  PhotonTracerSettings settings = photon_settings(100);
   const auto trace = [&](Results results) {
     Job job({}, std::move(results));
     job.interval = 1e-9;
     job.is_shard = true;  // Checkpoints keep only what took long.
     settings.job = &job;
-    traced(ClearCube(), floor, {sun({0.4, 0.3, -1})}, settings);
+    traced(TurningCube(), floor, {sun({0.4, 0.3, -1})}, settings);
     return job.results();
   };
   const Results kept = trace({});
@@ -124,36 +89,34 @@ TEST(PhotonTracerTest, KeptPhotonsThatAreNoneAreRefused) {
 }
 
 TEST(PhotonTracerTest, IsCancelledBetweenPhotons) {
-  struct CancellingCube : ClearCube {
-    explicit CancellingCube(Progress& progress) : progress_(progress) {}
+  struct CancellingCube : TurningCube {
     void trace_importance(std::vector<BentRay>& rays) const override {
-      ClearCube::trace_importance(rays);
-      progress_.cancelled = ++positions == 10;
+      TurningCube::trace_importance(rays);
+      progress.cancelled = ++positions == 10;
     }
-    mutable std::atomic<int> positions{0};
-    Progress& progress_;
+    mutable int positions = 0;
+    mutable Progress progress;
   };
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-  Progress progress;
-  const CancellingCube cube(progress);
-  EXPECT_THROW(traced(cube, floor_at(-0.8, 4), {sun({0, 0, -1})}, settings_of(4000), progress), Cancelled);
+  const CancellingCube cube;
+  EXPECT_THROW(traced(cube, floor_at(-0.8, 4), {sun({0, 0, -1})}, photon_settings(4000), cube.progress), Cancelled);
   EXPECT_EQ(cube.positions, 10);
 }
 
-/// Before the region, behind it, beside everything, and within it.
+/// A roof is above half of the cube, which loses one of two bands. The floor is behind a quarter of the cube.
 TEST(PhotonTracerTest, EveryPhotonEnds) {
-  const PhotonMaps photons =
-      traced(ClearCube(1, true), floor_at(-0.8, 0.5, true), {sun({0, 0, -1})}, settings_of(4000, 3));
+  TurningCube cube;
+  cube.lost_band = 1;
+  const PhotonMaps photons = traced(cube, floor_at(-0.8, 0.5, true), {sun({0, 0, -1})}, photon_settings(4000, 3));
   ASSERT_EQ(photons.counts.size(), 3u);
   for (const PhotonCounts& counts : photons.counts) {
     EXPECT_EQ(counts.emitted, 4000u * traced_bands);
     EXPECT_EQ(std::accumulate(counts.ends.begin(), counts.ends.end(), std::uint64_t{0}), counts.emitted);
+    EXPECT_NEAR(part_of(counts, PhotonEnd::before), 0.5, 0.02);
+    EXPECT_NEAR(part_of(counts, PhotonEnd::stopped), 0.5 / 2, 0.02);
+    EXPECT_NEAR(part_of(counts, PhotonEnd::landed), 0.5 / 2 * 0.25, 0.01);
+    EXPECT_NEAR(part_of(counts, PhotonEnd::escaped), 0.5 / 2 * 0.75, 0.01);
   }
-  EXPECT_NEAR(part_of(photons.counts[0], PhotonEnd::before), 0.5, 0.02);  // The roof, at x > 0; the rest is stopped.
-  EXPECT_NEAR(part_of(photons.counts[0], PhotonEnd::stopped), 0.5, 0.02);
-  const PhotonMaps open = traced(ClearCube(), floor_at(-0.8, 0.5), {sun({0, 0, -1})}, settings_of(4000));
-  EXPECT_NEAR(part_of(open.counts[0], PhotonEnd::landed), 0.25, 0.01);
-  EXPECT_NEAR(part_of(open.counts[0], PhotonEnd::escaped), 0.75, 0.01);
 }
 
 TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
@@ -168,7 +131,7 @@ TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
                                                       {sun(slanted, 0.1), 3 / slanted.norm()},
                                                       {point, 7 * -way.z() / std::pow(way.norm(), 3)}};
     for (std::size_t i = 0; i < cases.size(); ++i) {
-      const PhotonMaps photons = traced(ClearCube(), floor, {cases[i].first}, settings_of(4000, 32, 0.1));
+      const PhotonMaps photons = traced(TurningCube(), floor, {cases[i].first}, photon_settings(4000, 32, 0.1));
       const Mean mean = photon_irradiance(photons, at, 1);
       EXPECT_NEAR(mean.mean(), cases[i].second, 5 * mean.error()) << i << " " << height;
       EXPECT_LT(mean.error(), 0.04 * cases[i].second) << i;
@@ -178,9 +141,9 @@ TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
 
 TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
   const SurfaceScene floor = floor_at(-0.8, 0.5);
-  PhotonTracerSettings settings = settings_of(3000, 4, 0.12);
+  PhotonTracerSettings settings = photon_settings(3000, 4, 0.12);
   const auto mean_on_plate = [&] {
-    const PhotonMaps photons = traced(ClearCube(), floor, {sun({0, 0, -1})}, settings);
+    const PhotonMaps photons = traced(TurningCube(), floor, {sun({0, 0, -1})}, settings);
     Mean mean;
     for (int i = 0; i < 1600; ++i)
       mean.add(photon_irradiance(photons, floor_point(floor, (i % 40 - 19.5) / 80, (i / 40 - 19.5) / 80), 0).mean());
@@ -189,8 +152,6 @@ TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
   EXPECT_LT(mean_on_plate(), 0.9 * 2);
   Plate plate;
   plate.center = {0, 0, -0.8};
-  plate.right = {1, 0, 0};
-  plate.up = {0, 1, 0};
   plate.size = {0.5, 0.5};
   settings.plates = {plate};
   EXPECT_NEAR(mean_on_plate(), 2, 0.01 * 2);
@@ -198,21 +159,19 @@ TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
 
 /// The shading of photons is that of next-event estimation where nothing bends: one or the other, never both.
 TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
-  const World world(two_bands(), {surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8}))},
-                    {make_material(Diffuse{}, two_bands().grey(0.6))},
-                    {sun({0.2, -0.1, -1}), PointLight{{0.3, 0.2, 2}, {5, 7}}});
-  const ClearCube cube;
-  const PhotonMaps photons = traced(cube, world.surfaces, world.light_list, settings_of(4000, 16, 0.1));
-  ShadedScene bent = world.scene;
-  bent.region = &cube;
-  bent.photons = &photons;
+  const TurningCube cube;
+  FloorWorld bent(two_bands(), cube, Diffuse{}, 0.6, {sun({0.2, -0.1, -1}), PointLight{{0.3, 0.2, 2}, {5, 7}}});
+  const PhotonMaps photons = traced(cube, bent.surfaces, bent.light_list, photon_settings(4000, 16, 0.1));
+  ShadedScene straight = bent.scene;
+  straight.region = nullptr;
+  bent.scene.photons = &photons;
   const auto mean_of = [](const ShadedScene& scene, double x) {
     return seen(scene, {}, {x, -3, 1}, {x, 0.05, -0.8}, 2000, 1);
   };
-  const Mean with = mean_of(bent, 0.1), without = mean_of(world.scene, 0.1), beside = mean_of(bent, 2);
+  const Mean with = mean_of(bent.scene, 0.1), without = mean_of(straight, 0.1), beside = mean_of(bent.scene, 2);
   EXPECT_NEAR(with.mean(), without.mean(), 0.03 * without.mean());
   EXPECT_GT(without.mean(), 0.1);
-  EXPECT_NEAR(beside.mean(), mean_of(world.scene, 2).mean(), 5 * beside.error() + 1e-9);
+  EXPECT_NEAR(beside.mean(), mean_of(straight, 2).mean(), 5 * beside.error() + 1e-9);
 }
 
 TEST(PhotonTracerTest, VisitsAllPhotonsInReach) {
@@ -254,7 +213,7 @@ TEST(PhotonTracerTest, APointWithinTheRegionShinesAllAround) {
     const PointLight point{{0.1, 0, z}, {5, 7}};
     const double height = z + 0.8, part = (1 - height / std::hypot(height, 40 / 2)) / 2;
     const SurfaceScene floor = floor_at(-0.8, 40);
-    const PhotonMaps photons = traced(ClearCube(), floor, {point}, settings_of(60000, 8, 0.1));
+    const PhotonMaps photons = traced(TurningCube(), floor, {point}, photon_settings(60000, 8, 0.1));
     EXPECT_EQ(photons.counts[0].emitted, 60000u * traced_bands);
     const double landed = part_of(photons.counts[0], PhotonEnd::landed);
     if (z < 0.5) {  // From above, light that passes the cube is left to others.
@@ -268,7 +227,7 @@ TEST(PhotonTracerTest, APointWithinTheRegionShinesAllAround) {
     }
   }
   EXPECT_TRUE(
-      traced(ClearCube(), floor_at(-0.8, 40), {PointLight{{0, 0, 0.2}, {5, 7}}}, settings_of(0)).passes.empty());
+      traced(TurningCube(), floor_at(-0.8, 40), {PointLight{{0, 0, 0.2}, {5, 7}}}, photon_settings(0)).passes.empty());
 }
 
 IrradianceMap map_of(const std::vector<float>& irradiance, int width, int height) {
