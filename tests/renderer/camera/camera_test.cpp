@@ -10,8 +10,10 @@ namespace tensorray {
 namespace {
 
 /// Of each kind, without a lens.
-const Camera cameras[] = {perspective_camera({1, -5, 3}, {0.5, 1, 0}, {0, 0, 1}, 40, {640, 480}),
-                          orthographic_camera({-4, -3, -2}, {1, 1, 1}, {0, 1, 0.2}, 3, {300, 500})};
+std::vector<Camera> cameras() {
+  return {perspective_camera({1, -5, 3}, {0.5, 1, 0}, {0, 0, 1}, 40, {640, 480}),
+          orthographic_camera({-4, -3, -2}, {1, 1, 1}, {0, 1, 0.2}, 3, {300, 500})};
+}
 
 TEST(Camera, LooksAtItsTarget) {
   const Vector3d position(1, -5, 3), target(0.5, 1, 0);
@@ -41,7 +43,7 @@ TEST(Camera, SeesTheNamedAngleOrHeight) {
 }
 
 TEST(Camera, ToPixelUndoesTheRay) {
-  for (const Camera& camera : cameras) {
+  for (const Camera& camera : cameras()) {
     for (int i = 0; i < 100; ++i) {
       const Vector2d part(random_uniform(1, i, 0), random_uniform(1, i, 1));
       const Vector2d pixel = part.cwiseProduct(camera.resolution.cast<double>());
@@ -56,7 +58,7 @@ TEST(Camera, ToPixelUndoesTheRay) {
 
 TEST(Camera, TheLensIsSharpInThePlaneOfFocus) {
   for (const double radius : {0.0, 0.2})
-    for (Camera camera : cameras) {
+    for (Camera camera : cameras()) {
       camera.lens_radius = radius;
       const Vector2d pixel(77, 201);
       const auto in_plane = [&](const Vector2d& lens, double distance) -> Vector3d {

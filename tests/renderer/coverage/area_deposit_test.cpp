@@ -15,11 +15,12 @@ using Corners = std::array<Vector2d, 3>;
 
 constexpr int width = 13, height = 9;
 
-std::vector<double> pixels_of(AreaDeposit& deposit, int plane = 0) {
-  deposit.flush();
-  std::vector<double> pixels(width * height);
-  for (int y = 0; y < height; ++y)
-    AreaDeposit::read_row({&deposit}, y, plane, &pixels[static_cast<std::size_t>(y) * width]);
+/// The sums of all deposits, row by row.
+std::vector<double> pixels_of(const std::vector<AreaDeposit*>& deposits, int first_row = 0, int end_row = height) {
+  for (AreaDeposit* deposit : deposits) deposit->flush();
+  std::vector<double> pixels(static_cast<std::size_t>(width * (end_row - first_row)));
+  for (int y = first_row; y < end_row; ++y)
+    AreaDeposit::read_row({deposits.begin(), deposits.end()}, y, 0, &pixels[(y - first_row) * width]);
   return pixels;
 }
 
@@ -59,7 +60,7 @@ TEST(AreaDeposit, EachPixelGetsTheAreaThatItShares) {
       if (std::abs((b - a).x() * (c - a).y() - (b - a).y() * (c - a).x()) < 2e-3) continue;
       AreaDeposit deposit(width, height);
       add_triangle(deposit, {a, b, c}, 0.5e-4);
-      const std::vector<double> pixels = pixels_of(deposit);
+      const std::vector<double> pixels = pixels_of({&deposit});
       for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
           const Vector2d corner(x, y);
@@ -78,17 +79,9 @@ TEST(AreaDeposit, PartsAddUpToTheWhole) {
     const Corners t = random_triangle(engine, i % 5 == 0 ? 8 : 1);
     for (AreaDeposit* deposit : {&whole, &middle, i % 3 == 0 ? &first : &second}) add_triangle(*deposit, t, 1e-5);
   }
-  const std::vector<double> expected = pixels_of(whole);
-  for (AreaDeposit* deposit : {&first, &second, &middle}) deposit->flush();
-  std::vector<double> row(width);
-  for (int y = 0; y < height; ++y) {
-    const std::vector<double> wanted(expected.begin() + y * width, expected.begin() + (y + 1) * width);
-    AreaDeposit::read_row({&first, &second}, y, 0, row.data());
-    EXPECT_EQ(row, wanted) << y;
-    if (y < 3 || y >= 6) continue;
-    AreaDeposit::read_row({&middle}, y, 0, row.data());
-    EXPECT_EQ(row, wanted) << y;
-  }
+  const std::vector<double> expected = pixels_of({&whole});
+  EXPECT_EQ(pixels_of({&first, &second}), expected);
+  EXPECT_THAT(pixels_of({&middle}, 3, 6), testing::ElementsAreArray(&expected[3 * width], 3 * width));
 }
 
 /// Rounding takes points of long edges over the borders of the plate.
@@ -103,7 +96,7 @@ TEST(AreaDeposit, EdgesMayBeLong) {
     const Corners t{corner(i), corner(i / 3), corner(i / 9)};
     AreaDeposit deposit(width, height);
     add_triangle(deposit, t, 1e-5);
-    EXPECT_NEAR(sum(pixels_of(deposit)) / 1e-5, part_on_plate(t[0], t[1], t[2], {width, height}), 1e-7)
+    EXPECT_NEAR(sum(pixels_of({&deposit})) / 1e-5, part_on_plate(t[0], t[1], t[2], {width, height}), 1e-7)
         << i;  // Units of 2^-48.
   }
 }
@@ -118,14 +111,14 @@ TEST(AreaDeposit, NoPowerIsLostWhereTrianglesHaveNoArea) {
       const Vector2d c = a + uniform(engine, 0, 1) * (b - a) + thickness * across;
       AreaDeposit deposit(width, height);
       add_triangle(deposit, {a, b, c.cwiseMax(0).cwiseMin(corner)}, 1);
-      const std::vector<double> pixels = pixels_of(deposit);
+      const std::vector<double> pixels = pixels_of({&deposit});
       ASSERT_NEAR(sum(pixels), 1, 1e-6) << thickness;
       ASSERT_GT(*std::min_element(pixels.begin(), pixels.end()), -1e-6) << thickness;
     }
   AreaDeposit deposit(width, height);
   const Vector2d point(2.5, 3.5);
   add_triangle(deposit, {point, point, point}, 1);
-  EXPECT_EQ(pixels_of(deposit)[3 * width + 2], 1);
+  EXPECT_EQ(pixels_of({&deposit})[3 * width + 2], 1);
 }
 
 /// The density along a triangle's longest side is that of the triangle, seen from the side.
@@ -134,8 +127,7 @@ TEST(AreaDeposit, LinesAreWhatThinTrianglesTendTo) {
   const Vector2d a(0.25, 4.5), b(12.5, 4.5), c(4, 4.5);
   add_triangle(line, {a, b, c}, 1e-3);
   add_triangle(thin, {a, b, c + Vector2d(0, 1e-3)}, 1e-3);
-  const std::vector<double> expected = pixels_of(thin), pixels = pixels_of(line);
-  for (std::size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(pixels[i], expected[i], 0.02e-3);
+  EXPECT_THAT(pixels_of({&line}), testing::Pointwise(testing::DoubleNear(0.02e-3), pixels_of({&thin})));
 }
 
 /// A grid of cells x cells squares over [0, 1]², two triangles each. `map` moves the vertices.

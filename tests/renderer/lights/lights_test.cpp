@@ -18,7 +18,7 @@ namespace {
 
 const AlignedBox3d unit_scene(Vector3d(-1, -1, -1), Vector3d(1, 1, 1));
 
-/// A light of one band, 2 by 1.2, above the origin and tilted; it emits downwards.
+/// A light of one band, 2 by 1.2, above the origin and tilted; it emits downward()s.
 AreaLight lamp(float radiance) {
   const Vector3d right(0.8, 0, -0.6), up(0, -1, 0);
   return {rectangle_mesh({0.3, -0.2, 1.5}, right, up, {2, 1.2}), {radiance}};
@@ -189,8 +189,10 @@ TEST(LightSampler, NamesTheLightThatIsWrong) {
 
 const std::vector<Vector3d> cube_corners = corners_of(unit_scene);
 
+Beam downward() { return silhouette_beam(cube_corners, {0, 0, -1}, Vector3d::UnitY()); }
+
 TEST(Beam, SilhouetteOfACube) {
-  EXPECT_NEAR(area(silhouette_beam(cube_corners, {0, 0, -1}, Vector3d::UnitY()).aperture), 4, 1e-12);
+  EXPECT_NEAR(area(downward().aperture), 4, 1e-12);
   // Along a diagonal it is a regular hexagon. Its area is 2 √3 times half the area of a face.
   const Beam hexagon = silhouette_beam(cube_corners, {1, 1, 1}, Vector3d::UnitZ());
   EXPECT_EQ(hexagon.aperture.size(), 6u);
@@ -226,8 +228,7 @@ TEST(Beam, PositionsFillTheAperture) {
 }
 
 TEST(Beam, GridPositionsAreCellCentres) {
-  const Beam beam = silhouette_beam(cube_corners, {0, 0, -1}, Vector3d::UnitY());
-  const BeamSampler sampler(beam, BeamPattern::grid, 16, 0);
+  const BeamSampler sampler(downward(), BeamPattern::grid, 16, 0);
   ASSERT_EQ(sampler.candidates(), 16u);
   Emission emission;
   ASSERT_TRUE(sampler.sample(5, emission));
@@ -237,9 +238,8 @@ TEST(Beam, GridPositionsAreCellCentres) {
 
 TEST(Beam, StrataSpreadOverThePositions) {
   // In each part of the beam, an eighth of the positions of a lattice has its stratum in each of 8 ranges.
-  const Beam beam = silhouette_beam(cube_corners, {0, 0, -1}, Vector3d::UnitY());
   for (const BeamPattern pattern : {BeamPattern::stratified, BeamPattern::sobol}) {
-    const BeamSampler sampler(beam, pattern, 4096, 3);
+    const BeamSampler sampler(downward(), pattern, 4096, 3);
     std::array<std::array<int, 8>, 16> counts{};
     Emission emission;
     for (std::uint64_t i = 0; i < sampler.candidates(); ++i) {
