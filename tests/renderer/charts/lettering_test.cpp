@@ -115,8 +115,10 @@ TEST(LetteringTest, OtherCharactersAreBoxes) {
 
 using Coordinate = std::function<double(double x, double y)>;
 
+double without_lines(double, double) { return 0.5; }
+
 /// Pixel coordinates from functions of the position; derivatives by central differences.
-std::vector<PixelCoordinates> seen(int width, int height, const Coordinate& s, const Coordinate& t) {
+std::vector<PixelCoordinates> seen(int width, int height, const Coordinate& s, const Coordinate& t = without_lines) {
   std::vector<PixelCoordinates> result;
   const double h = 1e-4;
   for (int row = 0; row < height; ++row)
@@ -131,9 +133,6 @@ std::vector<PixelCoordinates> seen(int width, int height, const Coordinate& s, c
     }
   return result;
 }
-
-/// A coordinate that has no lines.
-double nothing(double, double) { return 0.5; }
 
 std::vector<PixelCoordinates> undistorted(int width, int height) {
   return seen(
@@ -169,7 +168,7 @@ TEST(GridLinesTest, WidthDoesNotDependOnAngleOrMagnification) {
       const Coordinate s = [=](double x, double y) {
         return 0.5 + ((x - 256.1) * std::cos(angle) + (y - 256.2) * std::sin(angle)) / (spacing * cells);
       };
-      const Image image = drawn(size, size, seen(size, size, s, nothing), {{cells, cells}, 1.5});
+      const Image image = drawn(size, size, seen(size, size, s), {{cells, cells}, 1.5});
       // One line more or less at the border covers 1.5 size of size² pixels.
       EXPECT_NEAR(ink(image) / 3 / (size * size), 1.5 / spacing, 1.5 / size) << angle << " " << spacing;
     }
@@ -180,14 +179,14 @@ TEST(GridLinesTest, FoldsAreNotFlooded) {
   const int width = 401, height = 5;
   for (const double turning : {0.5, 0.5 - 1e-6, 0.5 - 1e-5, 0.5 - 1e-4}) {
     const Coordinate s = [=](double x, double) { return turning - 2e-6 * (x - 200.5) * (x - 200.5); };
-    const Image image = drawn(width, height, seen(width, height, s, nothing), {{2, 2}, 2});
+    const Image image = drawn(width, height, seen(width, height, s), {{2, 2}, 2});
     EXPECT_LE(ink(image) / 3 / height, 2 * 2 + 0.5) << turning;
   }
 }
 
 TEST(GridLinesTest, NoLinesBeyondThePicture) {
   const Coordinate s = [](double x, double) { return (x - 50) / 100; };  // From -0.5 to 1.5.
-  const Image image = drawn(200, 1, seen(200, 1, s, nothing), {{4, 4}, 2});
+  const Image image = drawn(200, 1, seen(200, 1, s), {{4, 4}, 2});
   for (int x = 0; x < 200; ++x) {
     const bool on_line = x >= 49 && x <= 150 && (x % 25 == 0 || x % 25 == 24);
     ASSERT_NEAR(*image.pixel(x, 0), on_line, 1e-6) << x;

@@ -1,6 +1,7 @@
 #include "renderer/light_maps/photon_tracer.h"
 
 #include <numeric>
+#include <tuple>
 
 #include <tbb/global_control.h>
 
@@ -126,15 +127,16 @@ TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
     const SurfaceScene floor = floor_at(height, 40);
     const SurfaceHit at = floor_point(floor, 0.05, -0.08);
     const Vector3d way = at.position - point.position;
-    const std::vector<std::pair<Light, double>> cases{{sun({0, 0, -1}), 3},
-                                                      {sun(slanted), 3 / slanted.norm()},
-                                                      {sun(slanted, 0.1), 3 / slanted.norm()},
-                                                      {point, 7 * -way.z() / std::pow(way.norm(), 3)}};
-    for (std::size_t i = 0; i < cases.size(); ++i) {
-      const PhotonMaps photons = traced(TurningCube(), floor, {cases[i].first}, photon_settings(4000, 32, 0.1));
+    const std::vector<std::tuple<const char*, Light, double>> cases{
+        {"sun", sun({0, 0, -1}), 3},
+        {"slanted", sun(slanted), 3 / slanted.norm()},
+        {"disk", sun(slanted, 0.1), 3 / slanted.norm()},
+        {"point", point, 7 * -way.z() / std::pow(way.norm(), 3)}};
+    for (const auto& [name, light, expected] : cases) {
+      const PhotonMaps photons = traced(TurningCube(), floor, {light}, photon_settings(4000, 32, 0.1));
       const Mean mean = photon_irradiance(photons, at, 1);
-      EXPECT_NEAR(mean.mean(), cases[i].second, 5 * mean.error()) << i << " " << height;
-      EXPECT_LT(mean.error(), 0.04 * cases[i].second) << i;
+      EXPECT_NEAR(mean.mean(), expected, 5 * mean.error()) << name << " " << height;
+      EXPECT_LT(mean.error(), 0.04 * expected) << name << " " << height;
     }
   }
 }
