@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/constants.h"
+#include "base/geometry/box.h"
 #include "renderer/surfaces/surface.h"
 #include "tests/names.h"
 
@@ -20,7 +21,7 @@ inline ShadedSurface surface_of(TriangleMesh mesh, int material = 0, int light =
 /// A sphere of radius 1 with smooth normals.
 inline ShadedSurface sphere(int rings) {
   TriangleMesh mesh;
-  std::vector<Eigen::Vector3f> normals;
+  std::vector<Vector3f> normals;
   const auto around = static_cast<std::uint32_t>(2 * rings);
   for (int ring = 0; ring <= rings; ++ring)
     for (std::uint32_t i = 0; i < around; ++i) {
@@ -48,26 +49,18 @@ inline double volume(const TriangleMesh& mesh) {
 }
 
 /// Distance at which a straight ray enters a box about the origin: 0 if it starts inside, infinite if it misses it.
-inline double box_entry(const Eigen::Vector3d& half_size, const Eigen::Vector3d& origin,
-                        const Eigen::Vector3d& direction) {
-  double enters = 0, leaves = INFINITY;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double a = (-half_size[axis] - origin[axis]) / direction[axis];
-    const double b = (half_size[axis] - origin[axis]) / direction[axis];
-    enters = std::max(enters, std::min(a, b));
-    leaves = std::min(leaves, std::max(a, b));
-  }
-  return leaves > enters ? enters : INFINITY;
+inline double box_entry(const Vector3d& half_size, const Vector3d& origin, const Vector3d& direction) {
+  const auto [enters, leaves] = section_in({-half_size, half_size}, origin, direction);
+  return leaves > std::max(enters, 0.0) ? std::max(enters, 0.0) : INFINITY;
 }
 
 /// Lambert's formula (Schröder and Hanrahan 1993, "On the Form Factor Between Two Polygons"): the irradiance from a
 /// polygon of radiance 1 that is completely above the horizon of the surface.
-inline double polygon_irradiance(const std::vector<Eigen::Vector3d>& polygon, const Eigen::Vector3d& point,
-                                 const Eigen::Vector3d& normal) {
+inline double polygon_irradiance(const std::vector<Vector3d>& polygon, const Vector3d& point, const Vector3d& normal) {
   double sum = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Eigen::Vector3d a = (polygon[i] - point).normalized();
-    const Eigen::Vector3d b = (polygon[(i + 1) % polygon.size()] - point).normalized();
+    const Vector3d a = (polygon[i] - point).normalized();
+    const Vector3d b = (polygon[(i + 1) % polygon.size()] - point).normalized();
     sum += std::acos(a.dot(b)) * a.cross(b).normalized().dot(normal) / 2;
   }
   return std::abs(sum);

@@ -32,11 +32,6 @@ inline double chi_square_score(const std::vector<int>& counts, const std::vector
   return (sum - freedom) / std::sqrt(2 * std::max(1.0, freedom));
 }
 
-/// As above, for counts that should be equal.
-inline double chi_square_score(const std::vector<int>& counts) {
-  return chi_square_score(counts, std::vector<double>(counts.size(), 1.0));
-}
-
 /// The score of 65,536 points in 32 x 32 bins of the unit square. Points on the right and upper edges count in the last
 /// bins.
 template <class Point>
@@ -49,7 +44,7 @@ double square_score(const Point& point) {
     EXPECT_LE(p.maxCoeff(), 1 + 1e-12);
     ++counts[static_cast<std::size_t>(bin(p.x()) * 32 + bin(p.y()))];
   }
-  return chi_square_score(counts);
+  return chi_square_score(counts, std::vector<double>(counts.size(), 1.0));
 }
 
 /// The mean of independent values, and its standard error.
@@ -61,6 +56,7 @@ class Mean {
     mean_ += change / count_;
     squares_ += change * (value - mean_);
   }
+  double count() const { return count_; }
   double mean() const { return mean_; }
   double error() const { return std::sqrt(squares_ / (count_ - 1) / count_); }
 

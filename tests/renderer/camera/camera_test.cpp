@@ -9,19 +9,10 @@
 namespace tensorray {
 namespace {
 
-/// Several cameras of each kind.
+/// Of each kind, without a lens.
 std::vector<Camera> cameras() {
-  std::vector<Camera> result;
-  for (const double lens : {0.0, 0.2}) {
-    result.push_back(perspective_camera({1, -5, 3}, {0.5, 1, 0}, {0, 0, 1}, 40, {640, 480}));
-    result.push_back(orthographic_camera({-4, -3, -2}, {1, 1, 1}, {0, 1, 0.2}, 3, {300, 500}));
-    for (auto camera = result.end() - 2; camera != result.end(); ++camera) camera->lens_radius = lens;
-  }
-  return result;
-}
-
-Vector2d random_pixel(const Camera& camera, int i) {
-  return Vector2d(random_uniform(1, i, 0), random_uniform(1, i, 1)).cwiseProduct(camera.resolution.cast<double>());
+  return {perspective_camera({1, -5, 3}, {0.5, 1, 0}, {0, 0, 1}, 40, {640, 480}),
+          orthographic_camera({-4, -3, -2}, {1, 1, 1}, {0, 1, 0.2}, 3, {300, 500})};
 }
 
 TEST(Camera, LooksAtItsTarget) {
@@ -52,10 +43,10 @@ TEST(Camera, SeesTheNamedAngleOrHeight) {
 }
 
 TEST(Camera, ToPixelUndoesTheRay) {
-  for (Camera camera : cameras()) {
-    camera.lens_radius = 0;
+  for (const Camera& camera : cameras()) {
     for (int i = 0; i < 100; ++i) {
-      const Vector2d pixel = random_pixel(camera, i);
+      const Vector2d part(random_uniform(1, i, 0), random_uniform(1, i, 1));
+      const Vector2d pixel = part.cwiseProduct(camera.resolution.cast<double>());
       const CameraRay ray = camera_ray(camera, pixel, Vector2d::Zero());
       EXPECT_NEAR(ray.direction.norm(), 1, 1e-14);
       EXPECT_LT((*to_pixel(camera, ray.origin + 7 * ray.direction) - pixel).norm(), 1e-10);
@@ -66,27 +57,29 @@ TEST(Camera, ToPixelUndoesTheRay) {
 }
 
 TEST(Camera, TheLensIsSharpInThePlaneOfFocus) {
-  for (const Camera& camera : cameras()) {
-    const Vector2d pixel(77, 201);
-    const auto in_plane = [&](const Vector2d& lens, double distance) -> Vector3d {
-      const CameraRay ray = camera_ray(camera, pixel, lens);
-      const double depth = distance - (ray.origin - camera.position).dot(camera.forward);
-      return ray.origin + depth / ray.direction.dot(camera.forward) * ray.direction;
-    };
-    const Vector3d sharp = in_plane({0, 0}, camera.focus_distance);
-    EXPECT_LT((*to_pixel(camera, sharp) - pixel).norm(), 1e-10);
-    for (const Vector2d& lens : {Vector2d(1, 0), Vector2d(-0.6, 0.8), Vector2d(0.1, -0.4)}) {
-      EXPECT_LT((in_plane(lens, camera.focus_distance) - sharp).norm(), 1e-12);
-      // At twice the focus distance the circle of confusion is as large as the lens.
-      const double blur =
-          (in_plane(lens, 2 * camera.focus_distance) - in_plane({0, 0}, 2 * camera.focus_distance)).norm();
-      EXPECT_NEAR(blur, camera.lens_radius * lens.norm(), 1e-12);
+  for (const double radius : {0.0, 0.2})
+    for (Camera camera : cameras()) {
+      camera.lens_radius = radius;
+      const Vector2d pixel(77, 201);
+      const auto in_plane = [&](const Vector2d& lens, double distance) -> Vector3d {
+        const CameraRay ray = camera_ray(camera, pixel, lens);
+        const double depth = distance - (ray.origin - camera.position).dot(camera.forward);
+        return ray.origin + depth / ray.direction.dot(camera.forward) * ray.direction;
+      };
+      const double focus = camera.focus_distance;
+      const Vector3d sharp = in_plane({0, 0}, focus);
+      EXPECT_LT((*to_pixel(camera, sharp) - pixel).norm(), 1e-10);
+      for (const Vector2d& lens : {Vector2d(1, 0), Vector2d(-0.6, 0.8), Vector2d(0.1, -0.4)}) {
+        EXPECT_LT((in_plane(lens, focus) - sharp).norm(), 1e-12);
+        // At twice the focus distance the circle of confusion is as large as the lens.
+        const double blur = (in_plane(lens, 2 * focus) - in_plane({0, 0}, 2 * focus)).norm();
+        EXPECT_NEAR(blur, radius * lens.norm(), 1e-12);
+      }
     }
-  }
 }
 
 /// The extent of a box in the picture, from 0 to 1 along both axes of the picture.
-Eigen::AlignedBox2d extent_in_picture(const Camera& camera, const Eigen::AlignedBox3d& box) {
+Eigen::AlignedBox2d extent_in_picture(const Camera& camera, const AlignedBox3d& box) {
   Eigen::AlignedBox2d extent;
   for (const Vector3d& corner : corners_of(box)) {
     const auto pixel = to_pixel(camera, corner);
@@ -102,7 +95,7 @@ TEST(Framing, ShowsTheWholeBoxAsLargeAsItCanBe) {
     const double scale = std::pow(10, 12 * random(0) - 6);
     const Vector3d size(std::pow(10, 3 * random(1) - 3), std::pow(10, 3 * random(2) - 3), 1);
     const Vector3d corner = 10 * Vector3d(random(3) - 0.5, random(4) - 0.5, random(5) - 0.5);
-    const Eigen::AlignedBox3d box(scale * corner, scale * (corner + size));
+    const AlignedBox3d box(scale * corner, scale * (corner + size));
     Framing framing;
     if (i % 2) framing.projection = Projection::orthographic;
     if (i % 5) framing.direction = Vector3d(random(6) - 0.5, random(7) - 0.5, random(8) - 0.5);
@@ -112,12 +105,11 @@ TEST(Framing, ShowsTheWholeBoxAsLargeAsItCanBe) {
 
     const Camera camera = frame_points(corners_of(box), framing);
     const Eigen::AlignedBox2d extent = extent_in_picture(camera, box);
-    const Vector2d size_in_picture = extent.sizes();
     EXPECT_GE(extent.min().minCoeff(), framing.margin - 1e-9) << i;
     EXPECT_LE(extent.max().maxCoeff(), 1 - framing.margin + 1e-9) << i;
     EXPECT_LT((extent.center() - Vector2d(0.5, 0.5)).norm(), 1e-6) << i;
     // In at least one direction there is no free space except the margin.
-    EXPECT_NEAR(size_in_picture.maxCoeff(), 1 - 2 * framing.margin, 1e-6) << i;
+    EXPECT_NEAR(extent.sizes().maxCoeff(), 1 - 2 * framing.margin, 1e-6) << i;
     EXPECT_GT(camera.focus_distance, 0);
     EXPECT_EQ(camera.lens_radius, 0);
   }
@@ -130,7 +122,7 @@ TEST(Framing, ShowsWhatHasNoVolume) {
         Framing framing;
         framing.projection = projection;
         framing.direction = direction;
-        const Eigen::AlignedBox3d box(Vector3d(5, 6, 7), Vector3d(5, 6, 7) + size);
+        const AlignedBox3d box(Vector3d(5, 6, 7), Vector3d(5, 6, 7) + size);
         const Camera camera = frame_points(corners_of(box), framing);
         const Eigen::AlignedBox2d extent = extent_in_picture(camera, box);
         EXPECT_GE(extent.min().minCoeff(), 0.05 - 1e-9);
@@ -141,17 +133,15 @@ TEST(Framing, ShowsWhatHasNoVolume) {
       }
 }
 
-constexpr PixelFilterShape all_shapes[] = {PixelFilterShape::box, PixelFilterShape::gaussian,
-                                           PixelFilterShape::blackman_harris};
-
-constexpr double radius = 1.5;  // Of the box, half a pixel.
+constexpr double filter_radius = 1.5;  // Of the box, half a pixel.
 
 /// One of the two factors of the filter at x, divided by its value at 0.
 double profile(PixelFilterShape shape, double x) {
-  const double cosine = std::cos(pi * x / radius), edge = std::exp(-4.5);
+  const double cosine = std::cos(pi * x / filter_radius), edge = std::exp(-4.5);
   if (shape == PixelFilterShape::gaussian) return (std::exp(-2 * x * x) - edge) / (1 - edge);
   if (shape == PixelFilterShape::box) return std::abs(x) <= 0.5 ? 1 : 0;
-  return 0.35875 + 0.48829 * cosine + 0.14128 * std::cos(2 * pi * x / radius) + 0.01168 * std::cos(3 * pi * x / radius);
+  return 0.35875 + 0.48829 * cosine + 0.14128 * std::cos(2 * pi * x / filter_radius) +
+         0.01168 * std::cos(3 * pi * x / filter_radius);
 }
 
 /// The midpoint rule; its error for these profiles is far below 1e-7.
@@ -163,9 +153,11 @@ double integrate(PixelFilterShape shape, double from, double to) {
 }
 
 TEST(PixelFilter, SamplesAreQuantilesOfTheShape) {
-  for (const PixelFilterShape shape : all_shapes) {
+  for (const PixelFilterShape shape :
+       {PixelFilterShape::box, PixelFilterShape::gaussian, PixelFilterShape::blackman_harris}) {
+    SCOPED_TRACE(static_cast<int>(shape));
     const PixelFilter filter(shape);
-    const double end = shape == PixelFilterShape::box ? 0.5 : radius, whole = integrate(shape, -end, end);
+    const double end = shape == PixelFilterShape::box ? 0.5 : filter_radius, whole = integrate(shape, -end, end);
     double last = -end;
     for (const double u : {0.0, 1e-9, 1e-4, 0.003, 0.1, 0.25, 0.4999, 0.5, 0.6, 0.77, 0.999, 1 - 1e-6, 1 - 0x1p-32}) {
       const Vector2d offset = filter.sample({u, 1 - u});

@@ -66,18 +66,12 @@ TEST(FurnaceTest, WhiteThingsInAWhiteSkyCannotBeSeen) {
   }
 }
 
-/// A box whose triangles face inwards, where they emit light.
-TriangleMesh room(const Eigen::AlignedBox3d& box) {
-  TriangleMesh mesh = box_mesh(box, Eigen::Affine3d::Identity());
-  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
-  return mesh;
-}
-
 TEST(FurnaceTest, GreyBoxHasTheGeometricSeries) {
   // In a closed box of reflectance ρ whose walls emit radiance e, the radiance is e / (1 − ρ) everywhere.
-  const TriangleMesh box = room({Vector3d(-1, -1, -1), Vector3d(1, 2, 1)});
-  AreaLight light{box, even(0.5f)};
-  const World world(rgb(), {surface_of(box, 0, 0)}, {make_material(Diffuse{}, grey(0.6))}, {light});
+  TriangleMesh box = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 2, 1)}, Affine3d::Identity());
+  for (auto& triangle : box.triangles) std::swap(triangle[1], triangle[2]);  // They face inwards.
+  const World world(rgb(), {surface_of(box, 0, 0)}, {make_material(Diffuse{}, grey(0.6))},
+                    {AreaLight{box, even(0.5f)}});
   for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material}) {
     ShadingSettings settings = deep();
     settings.direct = direct;
@@ -151,27 +145,21 @@ TEST(ShadingNormalTest, SmoothSpheresHaveNoFringesAndDoNotLeak) {
   }
 }
 
-TEST(AmbientOcclusionTest, HasItsClosedForms) {
+TEST(PreviewTest, HasItsClosedForms) {
+  const World plane(rgb(), {surface_of(floor_mesh(4))}, {make_material(Diffuse{}, grey(0.8))}, {});
   ShadingSettings settings;
-  settings.shading = Shading::ambient_occlusion;
-  const Material material = make_material(Diffuse{}, grey(0.8));
-  const World plane(rgb(), {surface_of(floor_mesh(4))}, {material}, {});
-  EXPECT_NEAR(seen(plane.scene, settings, {0, -3, 1}, {0, 0, 0}, 100).mean(), 0.8, 1e-12);
+  settings.shading = Shading::headlight;  // The cosine to the viewer.
+  for (const double z : {4, -4})
+    EXPECT_NEAR(seen(plane.scene, settings, {0, -3, z}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12) << z;
 
+  settings.shading = Shading::ambient_occlusion;
+  EXPECT_NEAR(seen(plane.scene, settings, {0, -3, 1}, {0, 0, 0}, 100).mean(), 0.8, 1e-12);
   // A high wall hides half of the sky from its foot. At a distance it hides (1 − cos θ) / 2, where θ is the elevation
   // of its upper edge.
   const TriangleMesh wall = rectangle_mesh({0, 1, 1}, {1, 0, 0}, {0, 0, 1}, {4000, 2});
-  const World corner(rgb(), {surface_of(floor_mesh(4)), surface_of(wall)}, {material}, {});
+  const World corner(rgb(), {surface_of(floor_mesh(4)), surface_of(wall)}, plane.materials, {});
   const Mean mean = seen(corner.scene, settings, {0, -3, 1}, {0, 0, 0}, 4000);
   EXPECT_NEAR(mean.mean(), 0.8 * (1 - (1 - std::sqrt(0.2)) / 2), 4 * mean.error() + 1e-3);
-}
-
-TEST(HeadlightTest, IsTheCosineToTheViewer) {
-  ShadingSettings settings;
-  settings.shading = Shading::headlight;
-  const World plane(rgb(), {surface_of(floor_mesh(4))}, {make_material(Diffuse{}, grey(0.8))}, {});
-  EXPECT_NEAR(seen(plane.scene, settings, {0, -3, 4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
-  EXPECT_NEAR(seen(plane.scene, settings, {0, -3, -4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
 }
 
 /// A sphere with data on a floor, lit by a lamp and a dim sky.
@@ -192,6 +180,13 @@ World still_life() {
                {lamp, ConstantLight{even(0.3f)}});
 }
 
+class PictureTest : public ::testing::Test {
+ protected:
+  const World world = still_life();
+  PathTracerSettings settings;
+  RenderCallbacks callbacks;
+};
+
 Camera camera(int size) { return perspective_camera({0, -6, 1}, {0, 0, 0}, {0, 0, 1}, 30, {size, size}); }
 
 std::vector<int> samples_of(const SurfacePicture& picture) {
@@ -200,11 +195,8 @@ std::vector<int> samples_of(const SurfacePicture& picture) {
   return samples;
 }
 
-/// Without time, each pixel gets its first samples, whoever renders its tile; with more time than it takes, it gets
-/// all.
-TEST(PictureTest, TimeLimitsTheSamples) {
-  const World world = still_life();
-  PathTracerSettings settings;
+/// Without time, each pixel gets its first samples, whoever renders its tile; with more than it takes, it gets all.
+TEST_F(PictureTest, TimeLimitsTheSamples) {
   settings.min_samples = settings.pass_samples = 6;
   settings.max_samples = 12;
   const SurfacePicture all = render_surfaces(world.scene, camera(20), settings);
@@ -212,13 +204,11 @@ TEST(PictureTest, TimeLimitsTheSamples) {
   settings.first_samples = 2;
   const SurfacePicture in_time = render_surfaces(world.scene, camera(20), settings);
   EXPECT_EQ(samples_of(in_time), samples_of(all));
-  for (std::size_t i = 0; i < all.radiance.values.size(); ++i)
-    EXPECT_NEAR(in_time.radiance.values[i], all.radiance.values[i], 1e-12);
+  EXPECT_THAT(in_time.radiance.values, testing::Pointwise(testing::DoubleNear(1e-12), all.radiance.values));
 
   settings.max_seconds = 0;
   Job shard({1, 2});
   shard.is_shard = true;
-  RenderCallbacks callbacks;
   callbacks.job = &shard;
   const SurfacePicture part = render_surfaces(world.scene, camera(20), settings, callbacks);
   EXPECT_EQ(shard.results().size(), 2u);
@@ -229,16 +219,13 @@ TEST(PictureTest, TimeLimitsTheSamples) {
 
 /// A checkpoint has colours alone unless the bands are wanted; a shard has both. Whoever continues, the picture is the
 /// same; tiles without bands that are wanted now are rendered again.
-TEST(PictureTest, KeepsBandsWhereTheyAreWanted) {
-  const World world = still_life();
-  PathTracerSettings settings;
+TEST_F(PictureTest, KeepsBandsWhereTheyAreWanted) {
   settings.min_samples = settings.max_samples = 4;
   const SurfacePicture all = render_surfaces(world.scene, camera(20), settings);
   std::size_t sizes[2] = {};
   for (const bool is_shard : {false, true}) {
     Job job;
     job.is_shard = is_shard;
-    RenderCallbacks callbacks;
     callbacks.job = &job;
     settings.spectral = false;
     EXPECT_TRUE(render_surfaces(world.scene, camera(20), settings, callbacks).radiance.values.empty());
@@ -256,13 +243,10 @@ TEST(PictureTest, KeepsBandsWhereTheyAreWanted) {
   EXPECT_LT(sizes[0] + 20 * 20 * 3 * 4, sizes[1]);  // Three bands.
 }
 
-TEST(PictureTest, IsCancelledWithinATile) {
-  const World world = still_life();
-  PathTracerSettings settings;
+TEST_F(PictureTest, IsCancelledWithinATile) {
   settings.min_samples = settings.max_samples = 1 << 20;
   std::atomic<bool> cancelled{false};
   Job job;
-  RenderCallbacks callbacks;
   callbacks.cancelled = &cancelled;
   callbacks.job = &job;
   callbacks.progress = [&](std::uint64_t, std::uint64_t) { job.stopping = true; };
@@ -276,44 +260,32 @@ TEST(PictureTest, IsCancelledWithinATile) {
   EXPECT_TRUE(job.results().empty());
 }
 
-TEST(PictureTest, AdaptiveSamplingKeepsTheMeanAndWorksWhereItIsNoisy) {
-  const World world = still_life();
-  PathTracerSettings settings;
-  settings.min_samples = 16;
-  settings.pass_samples = 16;
-  settings.max_samples = 128;
+TEST_F(PictureTest, AdaptiveSamplingKeepsTheMeanAndWorksWhereItIsNoisy) {
+  settings.max_samples = 128;  // 16 of each pass.
   const SurfacePicture full = render_surfaces(world.scene, camera(32), settings);
   settings.noise_threshold = 0.06;
   settings.seed = 1;
   const SurfacePicture adaptive = render_surfaces(world.scene, camera(32), settings);
   const auto sum = [](const auto& values) { return std::accumulate(values.begin(), values.end(), 0.0); };
-  const auto variance = [](const SurfacePicture& picture) {
-    double all = 0;
-    for (const PixelState& pixel : picture.pixels) all += pixel.variance();
-    return all;
-  };
   const double samples = sum(samples_of(adaptive)), pixels = 32 * 32;
   EXPECT_LT(samples, 0.7 * 128 * pixels);
   EXPECT_GT(samples, 17 * pixels);
   // Error of the mean over the picture, from the variances of the pixels (of the luminance, which is nearly common to
   // all bands).
-  const double error = std::sqrt(variance(full) + variance(adaptive)) / pixels;
+  double variance = 0;
+  for (const SurfacePicture* picture : {&full, &adaptive})
+    for (const PixelState& pixel : picture->pixels) variance += pixel.variance();
+  const double error = std::sqrt(variance) / pixels;
   EXPECT_NEAR(sum(adaptive.radiance.values) / pixels / 3, sum(full.radiance.values) / pixels / 3, 5 * error);
 
-  double noise_of_many = 0, noise_of_few = 0, many = 0, few = 0;
-  for (std::size_t i = 0; i < adaptive.pixels.size(); ++i) {
-    const double noise = full.pixels[i].variance();
-    (adaptive.pixels[i].samples > 64 ? noise_of_many : noise_of_few) += noise;
-    (adaptive.pixels[i].samples > 64 ? many : few) += 1;
-  }
-  ASSERT_GT(many, 5);
-  ASSERT_GT(few, 5);
-  EXPECT_GT(noise_of_many / many, 1.5 * noise_of_few / few);
+  Mean many, few;  // Noise of pixels with many samples and with few.
+  for (std::size_t i = 0; i < adaptive.pixels.size(); ++i)
+    (adaptive.pixels[i].samples > 64 ? many : few).add(full.pixels[i].variance());
+  ASSERT_GT(std::min(many.count(), few.count()), 5);
+  EXPECT_GT(many.mean(), 1.5 * few.mean());
 }
 
-TEST(PictureTest, AuxiliaryPlanesAreThoseOfTheFirstSurface) {
-  const World world = still_life();
-  PathTracerSettings settings;
+TEST_F(PictureTest, AuxiliaryPlanesAreThoseOfTheFirstSurface) {
   settings.min_samples = settings.max_samples = 16;
   settings.filter = PixelFilter(PixelFilterShape::box);
   settings.transparent = true;
@@ -350,22 +322,20 @@ TEST(PictureTest, AuxiliaryPlanesAreThoseOfTheFirstSurface) {
     }
 }
 
-TEST(PictureTest, WhatIsMissingIsNamed) {
+TEST_F(PictureTest, WhatIsMissingIsNamed) {
   const AreaLight lamp{floor_mesh(1), even(1)};
   const Material material = make_material(Diffuse{}, grey(1));
-  const auto error = [&](const World& world, const PathTracerSettings& settings) {
-    return message([&] { render_surfaces(world.scene, camera(4), settings); });
+  const auto error = [&](const World& wrong) {
+    return message([&] { render_surfaces(wrong.scene, camera(4), settings); });
   };
-  EXPECT_EQ(error(World(rgb(), {surface_of(floor_mesh(1), 1)}, {material}, {}), {}), "surface 0 has no material");
-  EXPECT_EQ(error(World(rgb(), {surface_of(floor_mesh(1))}, {material}, {lamp}), {}),
-            "light 0 must have a surface of its mesh");
-  EXPECT_EQ(error(World(rgb(), {surface_of(floor_mesh(1), 0, 1)}, {material}, {lamp}), {}),
+  EXPECT_EQ(error({rgb(), {surface_of(floor_mesh(1), 1)}, {material}, {}}), "surface 0 has no material");
+  EXPECT_EQ(error({rgb(), {surface_of(floor_mesh(1))}, {material}, {lamp}}), "light 0 must have a surface of its mesh");
+  EXPECT_EQ(error({rgb(), {surface_of(floor_mesh(1), 0, 1)}, {material}, {lamp}}),
             "surface 0 must be that of an area light");
-  EXPECT_EQ(error(World(rgb(), {}, {make_material(Diffuse{}, BandValues::Ones(2))}, {}), {}),
+  EXPECT_EQ(error({rgb(), {}, {make_material(Diffuse{}, BandValues::Ones(2))}, {}}),
             "material 0 must have a reflectance for each band of the light");
-  PathTracerSettings settings;
   settings.max_samples = 8;
-  EXPECT_EQ(error(World(rgb(), {}, {}, {}), settings), "max_samples must be >= min_samples");
+  EXPECT_EQ(error({rgb(), {}, {}, {}}), "max_samples must be >= min_samples");
 }
 
 }  // namespace

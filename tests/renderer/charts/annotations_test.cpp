@@ -1,7 +1,6 @@
 #include "renderer/charts/annotations.h"
 
-#include <utility>
-
+#include "base/geometry/box.h"
 #include "renderer/charts/color_bar.h"
 #include "renderer/charts/ink.h"
 #include "renderer/charts/lettering.h"
@@ -16,13 +15,18 @@ Image blank(int width, int height, float value) {
   return image;
 }
 
-/// The box of the pixels that differ from `value` by more than half.
-Eigen::AlignedBox2i drawn_box(const Image& image, float value) {
-  Eigen::AlignedBox2i box;
+template <class Predicate>
+std::vector<Vector2i> pixels_where(const Image& image, const Predicate& predicate) {
+  std::vector<Vector2i> found;
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
-      if (std::abs(image.pixel(x, y)[0] - value) > 0.5f) box.extend(Eigen::Vector2i(x, y));
-  return box;
+      if (predicate(image.pixel(x, y))) found.emplace_back(x, y);
+  return found;
+}
+
+/// The box of the pixels that differ from `value` by more than half.
+Eigen::AlignedBox2i drawn_box(const Image& image, float value) {
+  return box_of(pixels_where(image, [=](const float* p) { return std::abs(p[0] - value) > 0.5f; }));
 }
 
 TEST(AnnotationsTest, RoundLengthsAreTheGreatestThatFit) {
@@ -62,7 +66,7 @@ TEST(AnnotationsTest, CaptionIsInTheLowerRightCorner) {
 
 /// Axes of a plate lie along its right and up; an axis that points at the viewer is no line.
 TEST(AnnotationsTest, AxesPointAsThePictureShowsThem) {
-  const auto axes = [](const Eigen::Vector3d& right, const Eigen::Vector3d& up) {
+  const auto axes = [](const Vector3d& right, const Vector3d& up) {
     Image image = blank(400, 400, 0);
     draw_axes(image, right, up);
     return image;
@@ -77,19 +81,18 @@ TEST(AnnotationsTest, AxesPointAsThePictureShowsThem) {
   EXPECT_EQ(flat.min().x(), 13);
   EXPECT_NEAR(flat.min().y(), 13, 3);  // Small letters are lower than capital ones, for which there is room.
   // Seen along the diagonal, all three are lines.
-  const Eigen::Vector3d view = Eigen::Vector3d(-1, -1, -1).normalized();
-  const Eigen::Vector3d right = view.cross(Eigen::Vector3d::UnitZ()).normalized();
+  const Vector3d view = Vector3d(-1, -1, -1).normalized();
+  const Vector3d right = view.cross(Vector3d::UnitZ()).normalized();
   EXPECT_FALSE(drawn_box(axes(right, right.cross(view)), 0).isEmpty());
 }
 
 /// Legends with short words, one or two, are beside the picture and cover none of it. The room is even.
 TEST(AnnotationsTest, RoomIsForALegendAndLeavesThePicture) {
   for (const auto& [width, height] : {std::pair(200, 200), {512, 512}, {200, 900}, {1920, 1080}, {24, 16}}) {
-    Image image = blank(width, height, 0.6f);
-    const Image with_room = with_room_beside(image);
+    const Image with_room = with_room_beside(blank(width, height, 0.6f));
     Image wide = with_room;
     for (const std::size_t part : {0, 1})
-      draw_color_bar(wide, {"largest\n1/mm", {0, 0.0123}, [](double) { return Eigen::Vector3d(1, 0, 0); }}, {part, 2});
+      draw_color_bar(wide, {"largest\n1/mm", {0, 0.0123}, [](double) { return Vector3d(1, 0, 0); }}, {part, 2});
     wide = with_room_below(wide);
     draw_caption(wide, "a line that is longer than most, which is why its letters are smaller than they would be");
     for (int y = 0; y < height; ++y)
@@ -103,12 +106,11 @@ TEST(AnnotationsTest, RoomIsForALegendAndLeavesThePicture) {
 }
 
 TEST(AnnotationsTest, DirectionsOfAPatientHaveTheirLetters) {
-  const std::vector<std::pair<Eigen::Vector3d, std::string>> cases{
-      {{1, 0, 0}, "R"},       {{-1, 0, 0}, "L"},
-      {{0, 1, 0}, "A"},       {{0, -1, 0}, "P"},
-      {{0, 0, 1}, "S"},       {{0, 0, -1}, "I"},
-      {{0.3, 0, 0.954}, "S"}, {{0.6, 0, -0.8}, "IR"},
-      {{-0.8, 0.6, 0}, "LA"}, {{-0.66, -0.57, 0.49}, "LPS"}};
+  const std::vector<std::pair<Vector3d, std::string>> cases{{{1, 0, 0}, "R"},       {{-1, 0, 0}, "L"},
+                                                            {{0, 1, 0}, "A"},       {{0, -1, 0}, "P"},
+                                                            {{0, 0, 1}, "S"},       {{0, 0, -1}, "I"},
+                                                            {{0.3, 0, 0.954}, "S"}, {{0.6, 0, -0.8}, "IR"},
+                                                            {{-0.8, 0.6, 0}, "LA"}, {{-0.66, -0.57, 0.49}, "LPS"}};
   for (const auto& [direction, letters] : cases) EXPECT_EQ(anatomical_letters(direction), letters);
 }
 
@@ -151,28 +153,24 @@ TEST(RoundTicksTest, ScalesAreLinearOrLogarithmic) {
 
 /// A colour bar whose green increases with the position. Its red and blue are constant and appear nowhere else.
 ColorBar green_bar() {
-  return {"|T V|", {0, 4}, [](double x) { return Eigen::Vector3d(0.25, x, 0.125); }};
+  return {"|T V|", {0, 4}, [](double x) { return Vector3d(0.25, x, 0.125); }};
 }
 
-std::vector<Eigen::Vector2i> pixels_of_bar(const Image& image) {
-  std::vector<Eigen::Vector2i> found;
-  for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x)
-      if (image.pixel(x, y)[0] == 0.25f && image.pixel(x, y)[2] == 0.125f) found.emplace_back(x, y);
-  return found;
+std::vector<Vector2i> pixels_of_bar(const Image& image) {
+  return pixels_where(image, [](const float* p) { return p[0] == 0.25f && p[2] == 0.125f; });
 }
 
 TEST(ColorBarTest, ShowsAllPositionsFromTheBottomToTheTop) {
   for (const int size : {200, 400, 801}) {
     Image image = blank(size * 3 / 2, size, 0);
     draw_color_bar(image, green_bar());
-    const std::vector<Eigen::Vector2i> pixels = pixels_of_bar(image);
+    const std::vector<Vector2i> pixels = pixels_of_bar(image);
     ASSERT_FALSE(pixels.empty());
     const int top = pixels.front().y(), bottom = pixels.back().y();
     EXPECT_NEAR(bottom - top + 1, 0.6 * size, 1);
     EXPECT_NEAR(top + bottom, size, 0.15 * size);  // The bar is vertically centred, below its title.
     EXPECT_GT(pixels.front().x(), image.width * 0.75);
-    for (const Eigen::Vector2i& p : pixels)
+    for (const Vector2i& p : pixels)
       EXPECT_NEAR(image.pixel(p.x(), p.y())[1], (bottom + 0.5 - p.y()) / (bottom - top + 1), 1e-6);
   }
 }
@@ -181,7 +179,7 @@ TEST(ColorBarTest, ShowsAllPositionsFromTheBottomToTheTop) {
 TEST(ColorBarTest, TicksAreAtTheirValues) {
   Image image = blank(1000, 1000, 0);
   draw_color_bar(image, green_bar());
-  const std::vector<Eigen::Vector2i> pixels = pixels_of_bar(image);
+  const std::vector<Vector2i> pixels = pixels_of_bar(image);
   const double top = pixels.front().y(), bottom = pixels.back().y() + 1.0;
   const int x = pixels.back().x() + 6;
   std::vector<double> middles;
@@ -209,18 +207,15 @@ TEST(ColorBarTest, IsCutOffWhereThePictureIsSmall) {
 TEST(ColorKeyTest, ShowsEachColorOnceFromTheTop) {
   Image image = blank(400, 400, 0);
   draw_color_key(image, {"", {{"x", {1, 0, 0}}, {"y", {0, 1, 0}}, {"z", {0, 0, 1}}}});
-  std::vector<int> rows[3];
-  for (int y = 0; y < 400; ++y)
-    for (int x = 0; x < 400; ++x)
-      for (int c = 0; c < 3; ++c) {
-        const float* const p = image.pixel(x, y);
-        if (p[c] == 1 && p[(c + 1) % 3] == 0 && p[(c + 2) % 3] == 0) rows[c].push_back(y);
-      }
-  EXPECT_GT(rows[0].size(), 100u);
-  EXPECT_EQ(rows[0].size(), rows[1].size());
-  EXPECT_EQ(rows[0].size(), rows[2].size());
-  EXPECT_LT(rows[0].back(), rows[1].front());
-  EXPECT_LT(rows[1].back(), rows[2].front());
+  std::vector<Vector2i> pixels[3];
+  for (int c = 0; c < 3; ++c)
+    pixels[c] =
+        pixels_where(image, [c](const float* p) { return p[c] == 1 && p[(c + 1) % 3] == 0 && p[(c + 2) % 3] == 0; });
+  EXPECT_GT(pixels[0].size(), 100u);
+  EXPECT_EQ(pixels[0].size(), pixels[1].size());
+  EXPECT_EQ(pixels[0].size(), pixels[2].size());
+  EXPECT_LT(pixels[0].back().y(), pixels[1].front().y());
+  EXPECT_LT(pixels[1].back().y(), pixels[2].front().y());
 }
 
 }  // namespace

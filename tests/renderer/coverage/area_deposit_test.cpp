@@ -2,7 +2,6 @@
 
 #include <array>
 #include <functional>
-#include <limits>
 #include <numeric>
 #include <random>
 
@@ -16,16 +15,18 @@ using Corners = std::array<Vector2d, 3>;
 
 constexpr int width = 13, height = 9;
 
-std::vector<double> pixels_of(AreaDeposit& deposit, int plane = 0) {
-  deposit.flush();
-  std::vector<double> pixels(width * height);
-  for (int y = 0; y < height; ++y)
-    AreaDeposit::read_row({&deposit}, y, plane, &pixels[static_cast<std::size_t>(y) * width]);
+/// The sums of all deposits, row by row.
+std::vector<double> pixels_of(const std::vector<AreaDeposit*>& deposits, int first_row = 0, int end_row = height) {
+  for (AreaDeposit* deposit : deposits) deposit->flush();
+  std::vector<double> pixels(static_cast<std::size_t>(width * (end_row - first_row)));
+  for (int y = first_row; y < end_row; ++y)
+    AreaDeposit::read_row({deposits.begin(), deposits.end()}, y, 0, &pixels[(y - first_row) * width]);
   return pixels;
 }
 
 /// Adds a triangle that has no neighbours.
-void add_triangle(AreaDeposit& deposit, const Vector2d& a, const Vector2d& b, const Vector2d& c, double power) {
+void add_triangle(AreaDeposit& deposit, const Corners& corners, double power) {
+  const auto& [a, b, c] = corners;
   const double density = deposit.triangle(a, b, c, power);
   if (density == 0) return;
   deposit.add_edge(a, b, density);
@@ -35,57 +36,38 @@ void add_triangle(AreaDeposit& deposit, const Vector2d& a, const Vector2d& b, co
 
 double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
-double area(const std::vector<Vector2d>& polygon) {
-  double twice = 0;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
-    twice += a.x() * b.y() - a.y() * b.x();
-  }
-  return std::abs(twice) / 2;
+double uniform(std::mt19937& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
 }
 
-/// The part of a convex polygon where `sign` · coordinate >= `sign` · limit.
-std::vector<Vector2d> clipped(const std::vector<Vector2d>& polygon, int axis, double sign, double limit) {
-  std::vector<Vector2d> part;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
-    const double from = sign * (a[axis] - limit), to = sign * (b[axis] - limit);
-    if (from >= 0) part.push_back(a);
-    if ((from < 0) != (to < 0)) part.push_back(a + from / (from - to) * (b - a));
-  }
-  return part;
-}
-
-double area_in_pixel(const Corners& corners, int x, int y) {
-  std::vector<Vector2d> part(corners.begin(), corners.end());
-  part = clipped(part, 0, 1, x);
-  part = clipped(part, 0, -1, x + 1);
-  part = clipped(part, 1, 1, y);
-  return area(clipped(part, 1, -1, y + 1));
+Vector2d uniform(std::mt19937& random, const Vector2d& low, const Vector2d& high) {
+  return {uniform(random, low.x(), high.x()), uniform(random, low.y(), high.y())};
 }
 
 Corners random_triangle(std::mt19937& engine, double size) {
-  std::uniform_real_distribution<double> at(-4, 17), offset(-size, size);
-  const Vector2d middle(at(engine), at(engine) - 3);
+  const Vector2d middle = uniform(engine, {-4, -7}, {17, 14});
   Corners corners;
-  for (Vector2d& corner : corners) corner = middle + Vector2d(offset(engine), offset(engine));
+  for (Vector2d& corner : corners) corner = middle + uniform(engine, {-size, -size}, {size, size});
   return corners;
 }
 
+/// The part of the triangle's area is found by cutting it at the edges of the pixel.
 TEST(AreaDeposit, EachPixelGetsTheAreaThatItShares) {
   std::mt19937 engine(1);
   for (const double size : {0.2, 1.0, 4.0, 30.0})
     for (int i = 0; i < 300; ++i) {
-      const Corners t = random_triangle(engine, size);
-      const double all = area({t.begin(), t.end()});
-      if (all < 1e-3) continue;
+      const auto [a, b, c] = random_triangle(engine, size);
+      if (std::abs((b - a).x() * (c - a).y() - (b - a).y() * (c - a).x()) < 2e-3) continue;
       AreaDeposit deposit(width, height);
-      add_triangle(deposit, t[0], t[1], t[2], 0.5e-4);
-      const std::vector<double> pixels = pixels_of(deposit);
+      add_triangle(deposit, {a, b, c}, 0.5e-4);
+      const std::vector<double> pixels = pixels_of({&deposit});
       for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x)
-          ASSERT_NEAR(pixels[static_cast<std::size_t>(y) * width + x], 0.5e-4 * area_in_pixel(t, x, y) / all, 1e-13)
+        for (int x = 0; x < width; ++x) {
+          const Vector2d corner(x, y);
+          ASSERT_NEAR(pixels[static_cast<std::size_t>(y) * width + x],
+                      0.5e-4 * part_on_plate(a - corner, b - corner, c - corner, {1, 1}), 1e-13)
               << "size " << size << ", triangle " << i << ", pixel " << x << " " << y;
+        }
     }
 }
 
@@ -95,69 +77,57 @@ TEST(AreaDeposit, PartsAddUpToTheWhole) {
   AreaDeposit whole(width, height), first(width, height), second(width, height), middle(width, height, 3, 6);
   for (int i = 0; i < 400; ++i) {
     const Corners t = random_triangle(engine, i % 5 == 0 ? 8 : 1);
-    add_triangle(whole, t[0], t[1], t[2], 1e-5);
-    add_triangle(middle, t[0], t[1], t[2], 1e-5);
-    add_triangle(i % 3 == 0 ? first : second, t[0], t[1], t[2], 1e-5);
+    for (AreaDeposit* deposit : {&whole, &middle, i % 3 == 0 ? &first : &second}) add_triangle(*deposit, t, 1e-5);
   }
-  const std::vector<double> expected = pixels_of(whole);
-  for (AreaDeposit* deposit : {&first, &second, &middle}) deposit->flush();
-  std::vector<double> row(width);
-  for (int y = 0; y < height; ++y) {
-    const std::vector<double> wanted(expected.begin() + y * width, expected.begin() + (y + 1) * width);
-    AreaDeposit::read_row({&first, &second}, y, 0, row.data());
-    EXPECT_EQ(row, wanted) << y;
-    if (y < 3 || y >= 6) continue;
-    AreaDeposit::read_row({&middle}, y, 0, row.data());
-    EXPECT_EQ(row, wanted) << y;
-  }
+  const std::vector<double> expected = pixels_of({&whole});
+  EXPECT_EQ(pixels_of({&first, &second}), expected);
+  EXPECT_THAT(pixels_of({&middle}, 3, 6), testing::ElementsAreArray(&expected[3 * width], 3 * width));
 }
 
 /// Rounding takes points of long edges over the borders of the plate.
 TEST(AreaDeposit, EdgesMayBeLong) {
   std::mt19937 engine(9);
-  std::uniform_real_distribution<double> x(0, width), y(-1e6, 1e6);
-  const auto corner = [&](int i) { return Vector2d(i % 3 == 0 ? 0 : i % 3 == 1 ? width : x(engine), y(engine)); };
+  const auto corner = [&](int i) {
+    Vector2d place = uniform(engine, {0, -1e6}, {width, 1e6});
+    if (i % 3 < 2) place.x() = i % 3 == 0 ? 0 : width;
+    return place;
+  };
   for (int i = 0; i < 3000; ++i) {
     const Corners t{corner(i), corner(i / 3), corner(i / 9)};
     AreaDeposit deposit(width, height);
-    add_triangle(deposit, t[0], t[1], t[2], 1e-5);
-    EXPECT_NEAR(sum(pixels_of(deposit)) / 1e-5, part_on_plate(t[0], t[1], t[2], {width, height}), 1e-7)
+    add_triangle(deposit, t, 1e-5);
+    EXPECT_NEAR(sum(pixels_of({&deposit})) / 1e-5, part_on_plate(t[0], t[1], t[2], {width, height}), 1e-7)
         << i;  // Units of 2^-48.
   }
 }
 
 TEST(AreaDeposit, NoPowerIsLostWhereTrianglesHaveNoArea) {
   std::mt19937 engine(3);
-  std::uniform_real_distribution<double> x(0, width), y(0, height), part(0, 1);
+  const Vector2d corner(width, height);
   for (const double thickness : {0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3})
     for (int i = 0; i < 300; ++i) {
-      const Vector2d a(x(engine), y(engine)), b(x(engine), y(engine));
-      const Vector2d across = Vector2d(b.y() - a.y(), a.x() - b.x()).normalized();
-      Vector2d c = a + part(engine) * (b - a) + thickness * across;
-      c = c.cwiseMax(0).cwiseMin(Vector2d(width, height));
+      const Vector2d a = uniform(engine, {0, 0}, corner), b = uniform(engine, {0, 0}, corner);
+      const Vector2d across = (b - a).unitOrthogonal();
+      const Vector2d c = a + uniform(engine, 0, 1) * (b - a) + thickness * across;
       AreaDeposit deposit(width, height);
-      add_triangle(deposit, a, b, c, 1);
-      const std::vector<double> pixels = pixels_of(deposit);
+      add_triangle(deposit, {a, b, c.cwiseMax(0).cwiseMin(corner)}, 1);
+      const std::vector<double> pixels = pixels_of({&deposit});
       ASSERT_NEAR(sum(pixels), 1, 1e-6) << thickness;
       ASSERT_GT(*std::min_element(pixels.begin(), pixels.end()), -1e-6) << thickness;
     }
   AreaDeposit deposit(width, height);
-  add_triangle(deposit, {2.5, 3.5}, {2.5, 3.5}, {2.5, 3.5}, 1);
-  EXPECT_EQ(pixels_of(deposit)[3 * width + 2], 1);
+  const Vector2d point(2.5, 3.5);
+  add_triangle(deposit, {point, point, point}, 1);
+  EXPECT_EQ(pixels_of({&deposit})[3 * width + 2], 1);
 }
 
 /// The density along a triangle's longest side is that of the triangle, seen from the side.
 TEST(AreaDeposit, LinesAreWhatThinTrianglesTendTo) {
   AreaDeposit line(width, height), thin(width, height);
   const Vector2d a(0.25, 4.5), b(12.5, 4.5), c(4, 4.5);
-  add_triangle(line, a, b, c, 1e-3);
-  add_triangle(thin, a, b, c + Vector2d(0, 1e-3), 1e-3);
-  const std::vector<double> expected = pixels_of(thin), pixels = pixels_of(line);
-  for (std::size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(pixels[i], expected[i], 0.02e-3);
-}
-
-double uniform(std::mt19937& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
+  add_triangle(line, {a, b, c}, 1e-3);
+  add_triangle(thin, {a, b, c + Vector2d(0, 1e-3)}, 1e-3);
+  EXPECT_THAT(pixels_of({&line}), testing::Pointwise(testing::DoubleNear(0.02e-3), pixels_of({&thin})));
 }
 
 /// A grid of cells x cells squares over [0, 1]², two triangles each. `map` moves the vertices.
@@ -174,32 +144,47 @@ PlanarMesh grid(std::uint32_t cells, const std::function<Vector2d(const Vector2d
   return mesh;
 }
 
-/// A mesh of the unit square, moved and scaled. Inner vertices are jittered, so that all triangles are different.
-PlanarMesh jittered(std::uint32_t cells, std::mt19937& random, const Vector2d& offset = Vector2d::Zero(),
-                    double scale = 1) {
+struct MeshSquare {
+  const char* name;
+  Vector2d offset;
+  double scale;
+};
+
+const MeshSquare mesh_squares[] = {{"unit square", {0, 0}, 1},
+                                   {"far away", {1000, -1000}, 1},
+                                   {"small", {3e-20, 0}, 1e-20},
+                                   {"large", {0, 1e20}, 1e20}};
+
+/// A mesh of a square. Inner vertices are jittered, so that all triangles are different.
+PlanarMesh jittered(std::uint32_t cells, std::mt19937& random, const MeshSquare& square) {
   return grid(cells, [&](Vector2d p) {
     for (double& coordinate : p)
       if (coordinate > 0 && coordinate < 1) coordinate += uniform(random, -0.2, 0.2) / cells;
-    return Vector2d(offset + scale * p);
+    return Vector2d(square.offset + square.scale * p);
   });
 }
 
-Vector2d at(const PlanarMesh& mesh, const PlanarHit& hit) {
-  Vector2d point = Vector2d::Zero();
-  for (int i = 0; i < 3; ++i) point += hit.weights[i] * mesh.vertices[mesh.triangles[hit.triangle][i]];
-  return point;
-}
-
-std::vector<std::uint32_t> triangles(const std::vector<PlanarHit>& hits) {
-  std::vector<std::uint32_t> result;
-  for (const PlanarHit& hit : hits) result.push_back(hit.triangle);
-  return result;
+std::vector<PlanarHit> hits_at(const PlanarMeshSearch& search, const Vector2d& point) {
+  std::vector<PlanarHit> hits;
+  search.find(point, hits);
+  return hits;
 }
 
 std::vector<std::uint32_t> found(const PlanarMeshSearch& search, const Vector2d& point) {
-  std::vector<PlanarHit> hits;
-  search.find(point, hits);
-  return triangles(hits);
+  std::vector<std::uint32_t> result;
+  for (const PlanarHit& hit : hits_at(search, point)) result.push_back(hit.triangle);
+  return result;
+}
+
+/// Checks that the weights of each hit are those of the point.
+void expect_weights(const PlanarMesh& mesh, const std::vector<PlanarHit>& hits, const Vector2d& point, double error) {
+  for (const PlanarHit& hit : hits) {
+    Vector2d place = Vector2d::Zero();
+    for (int i = 0; i < 3; ++i) place += hit.weights[i] * mesh.vertices[mesh.triangles[hit.triangle][i]];
+    EXPECT_GE(hit.weights.minCoeff(), 0);
+    EXPECT_NEAR(hit.weights.sum(), 1, 1e-15);
+    EXPECT_LT((place - point).norm(), error);
+  }
 }
 
 std::vector<std::uint32_t> brute_force(const PlanarMesh& mesh, const Vector2d& point) {
@@ -236,74 +221,58 @@ TEST(PlanarMesh, AgreesWithBruteForceWhereTrianglesOverlap) {
   PlanarMesh mesh;  // Unconnected triangles of all sizes and both orientations.
   for (std::uint32_t i = 0; i < 600; ++i) {
     const double size = std::pow(10, uniform(random, -3, -0.5));
-    const Vector2d center(uniform(random, 0, 1), uniform(random, 0, 1));
+    const Vector2d center = uniform(random, {0, 0}, {1, 1});
     for (int corner = 0; corner < 3; ++corner)
-      mesh.vertices.push_back(center + size * Vector2d(uniform(random, -1, 1), uniform(random, -1, 1)));
+      mesh.vertices.push_back(center + size * uniform(random, {-1, -1}, {1, 1}));
     mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
   }
   const PlanarMeshSearch search(mesh);
   std::size_t total = 0;
-  std::vector<PlanarHit> hits;
   for (int i = 0; i < 5000; ++i) {
-    const Vector2d point(uniform(random, -0.2, 1.2), uniform(random, -0.2, 1.2));
-    search.find(point, hits);
-    ASSERT_EQ(triangles(hits), brute_force(mesh, point));
-    for (const PlanarHit& hit : hits) {
-      EXPECT_GE(hit.weights.minCoeff(), 0);
-      EXPECT_NEAR(hit.weights.sum(), 1, 1e-15);
-      EXPECT_LT((at(mesh, hit) - point).norm(), 1e-14);
-    }
-    total += hits.size();
+    const Vector2d point = uniform(random, {-0.2, -0.2}, {1.2, 1.2});
+    const std::vector<std::uint32_t> expected = brute_force(mesh, point);
+    ASSERT_EQ(found(search, point), expected);
+    expect_weights(mesh, hits_at(search, point), point, 1e-14);
+    total += expected.size();
   }
   EXPECT_GT(total, 2000u);
 }
 
-struct Place {
-  Vector2d offset;
-  double scale;
-};
-
-class PlanarMeshPlaces : public ::testing::TestWithParam<Place> {};
-
-INSTANTIATE_TEST_SUITE_P(Places, PlanarMeshPlaces,
-                         ::testing::Values(Place{{0, 0}, 1}, Place{{1000, -1000}, 1}, Place{{3e-20, 0}, 1e-20},
-                                           Place{{0, 1e20}, 1e20}));
-
-TEST_P(PlanarMeshPlaces, PointsOnEdgesAndVerticesAreFoundInAllTrianglesThatShareThem) {
-  std::mt19937 random(3);
-  const PlanarMesh mesh = jittered(40, random, GetParam().offset, GetParam().scale);
-  const PlanarMeshSearch search(mesh);
-  for (std::uint32_t vertex = 0; vertex < mesh.vertices.size(); ++vertex)
-    ASSERT_EQ(found(search, mesh.vertices[vertex]), sharing(mesh, {vertex}));
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (int i = 0; i < 3; ++i) {
-      const std::uint32_t from = mesh.triangles[t][i], to = mesh.triangles[t][(i + 1) % 3];
-      const Vector2d point =
-          mesh.vertices[from] + uniform(random, 0.01, 0.99) * (mesh.vertices[to] - mesh.vertices[from]);
-      ASSERT_EQ(found(search, point), sharing(mesh, {from, to}));
-    }
+TEST(PlanarMesh, PointsOnEdgesAndVerticesAreFoundInAllTrianglesThatShareThem) {
+  for (const MeshSquare& square : mesh_squares) {
+    SCOPED_TRACE(square.name);
+    std::mt19937 random(3);
+    const PlanarMesh mesh = jittered(40, random, square);
+    const PlanarMeshSearch search(mesh);
+    for (std::uint32_t vertex = 0; vertex < mesh.vertices.size(); ++vertex)
+      ASSERT_EQ(found(search, mesh.vertices[vertex]), sharing(mesh, {vertex}));
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+      for (int i = 0; i < 3; ++i) {
+        const std::uint32_t from = mesh.triangles[t][i], to = mesh.triangles[t][(i + 1) % 3];
+        const Vector2d edge = mesh.vertices[to] - mesh.vertices[from];
+        ASSERT_EQ(found(search, mesh.vertices[from] + uniform(random, 0.01, 0.99) * edge), sharing(mesh, {from, to}));
+      }
+  }
 }
 
-TEST_P(PlanarMeshPlaces, NoPointFallsBetweenTriangles) {
-  std::mt19937 random(4);
-  const auto& [offset, scale] = GetParam();
-  const PlanarMesh mesh = jittered(300, random, offset, scale);
-  const PlanarMeshSearch search(mesh);
-  const Vector2d center = offset + Vector2d::Constant(scale / 2);
-  std::vector<PlanarHit> hits;
-  for (int i = 0; i < 50000; ++i) {
-    const auto& triangle = mesh.triangles[random() % mesh.triangles.size()];
-    const Vector2d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]];
-    // Distance from an edge or a vertex, from below double precision to above single precision.
-    const double away = scale * std::pow(10, uniform(random, -18, -5)), along = i % 3 ? uniform(random, 0, 1) : 0;
-    Vector2d point = a + along * (b - a) + away * Vector2d(uniform(random, -1, 1), uniform(random, -1, 1));
-    point = point.cwiseMax(mesh.vertices.front()).cwiseMin(mesh.vertices.back());
-    search.find(point, hits);
-    ASSERT_GE(hits.size(), 1u) << (point - center).transpose();
-    for (const PlanarHit& hit : hits) {
-      EXPECT_GE(hit.weights.minCoeff(), 0);
-      EXPECT_NEAR(hit.weights.sum(), 1, 1e-15);
-      EXPECT_LT((at(mesh, hit) - point).norm(), 1e-14 * (center.norm() + scale));
+TEST(PlanarMesh, NoPointFallsBetweenTriangles) {
+  for (const MeshSquare& square : mesh_squares) {
+    SCOPED_TRACE(square.name);
+    std::mt19937 random(4);
+    const PlanarMesh mesh = jittered(300, random, square);
+    const PlanarMeshSearch search(mesh);
+    const Vector2d center = square.offset + Vector2d::Constant(square.scale / 2);
+    for (int i = 0; i < 50000; ++i) {
+      const auto& triangle = mesh.triangles[random() % mesh.triangles.size()];
+      const Vector2d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]];
+      // Distance from an edge or a vertex, from below double precision to above single precision.
+      const double away = square.scale * std::pow(10, uniform(random, -18, -5)),
+                   along = i % 3 ? uniform(random, 0, 1) : 0;
+      Vector2d point = a + along * (b - a) + away * uniform(random, {-1, -1}, {1, 1});
+      point = point.cwiseMax(mesh.vertices.front()).cwiseMin(mesh.vertices.back());
+      const std::vector<PlanarHit> hits = hits_at(search, point);
+      ASSERT_GE(hits.size(), 1u) << (point - center).transpose();
+      expect_weights(mesh, hits, point, 1e-14 * (center.norm() + square.scale));
     }
   }
 }
@@ -353,15 +322,14 @@ TEST(PlanarMesh, DegenerateTrianglesAreNeverFound) {
 }
 
 TEST(PlanarMesh, NothingIsFoundOutsideOrInAnEmptyMesh) {
-  const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
   PlanarMesh empty, point, square = grid(1, [](const Vector2d&p) { return p; });
   point.vertices = {{2, 3}};
   point.triangles = {{0, 0, 0}};
-  square.vertices.emplace_back(nan, infinite);  // Vertices that no triangle uses.
+  square.vertices.emplace_back(NAN, INFINITY);  // Vertices that no triangle uses.
   for (const PlanarMesh* mesh : {&empty, &point, &square}) {
     const PlanarMeshSearch search(*mesh);
     for (const Vector2d& place : {Vector2d(2, 3), Vector2d(-1e-9, 0.5), Vector2d(0.5, 1 + 1e-9), Vector2d(1e300, 0),
-                                  Vector2d(nan, 0.5), Vector2d(infinite, 0)})
+                                  Vector2d(NAN, 0.5), Vector2d(INFINITY, 0)})
       EXPECT_TRUE(found(search, place).empty()) << place.transpose();
   }
   EXPECT_TRUE(found(PlanarMeshSearch(empty), Vector2d::Zero()).empty());

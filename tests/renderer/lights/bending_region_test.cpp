@@ -9,42 +9,6 @@ namespace {
 
 constexpr int region_bands = 4;
 
-/// The ball of radius ½ about the origin. All light that passes through it turns about z by one angle for each band, at
-/// its centre, which keeps radiance; the ray goes on from the ball's centre.
-class TurningBall : public BendingRegion {
- public:
-  explicit TurningBall(double angle, double radiance_scale = 1) : angle_(angle), radiance_scale_(radiance_scale) {}
-
-  double entry(const Vector3d& origin, const Vector3d& direction) const override {
-    const double along = -origin.dot(direction);
-    const double half = 0.25 - (origin + along * direction).squaredNorm();
-    return half > 0 && along + std::sqrt(half) > 1e-9 ? std::max(0.0, along - std::sqrt(half)) : INFINITY;
-  }
-
-  void trace_radiance(std::vector<BentRay>& rays) const override {
-    for (BentRay& ray : rays) {
-      ray.position += entry(ray.position, ray.direction) * ray.direction;
-      ray.direction = Eigen::AngleAxisd(angle_ * (1 + ray.band), Vector3d::UnitZ()) * ray.direction;
-      ray.arrives = ray.band != lost_band;
-      ray.radiance_scale = radiance_scale_;
-    }
-  }
-
-  /// Light that passes the ball at its centre height turns back.
-  void trace_importance(std::vector<BentRay>& rays) const override {
-    for (BentRay& ray : rays) {
-      ray.position += entry(ray.position, ray.direction) * ray.direction;
-      ray.direction = Eigen::AngleAxisd(-angle_ * (1 + ray.band), Vector3d::UnitZ()) * ray.direction;
-      ray.arrives = true;
-    }
-  }
-
-  int lost_band = -1;  ///< Its light does not arrive.
-
- private:
-  double angle_, radiance_scale_;
-};
-
 const TestBands& four_bands() {
   static const TestBands result({{620, 60, 0.25, Vector3d(1, 0.3, 0)},
                                  {560, 60, 0.25, Vector3d(0.2, 0.5, 0)},
@@ -53,32 +17,14 @@ const TestBands& four_bands() {
   return result;
 }
 
-std::vector<float> even_reflectance(float value) { return four_bands().even(value); }
-
-/// A floor below the ball, lit by `lights`, of which the first may be the area light of a lamp.
-struct RegionStage : World {
-  explicit RegionStage(const std::vector<Light>& all_lights, double albedo = 0.6)
-      : World(four_bands(), parts(all_lights),
-              {make_material(Diffuse{}, four_bands().grey(albedo)), make_material(Diffuse{}, four_bands().grey(0))},
-              all_lights) {}
-
-  static std::vector<ShadedSurface> parts(const std::vector<Light>& lights) {
-    std::vector<ShadedSurface> result{surface_of(rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8}))};
-    if (const auto* lamp = std::get_if<AreaLight>(&lights[0])) result.push_back(surface_of(lamp->mesh, 1, 0));
-    return result;
-  }
-};
-
 AreaLight region_lamp() {
-  return {rectangle_mesh({0.3, 0, 1.2}, {1, 0, 0}, {0, -1, 0}, {0.8, 0.8}), even_reflectance(5)};
+  return {rectangle_mesh({0.3, 0, 1.2}, {1, 0, 0}, {0, -1, 0}, {0.8, 0.8}), four_bands().even(5)};
 }
 
 TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
-  RegionStage stage({ConstantLight{even_reflectance(1)}}, 1);
-  const TurningBall ball(0.3);
-  stage.scene.region = &ball;
-  stage.scene.bands_per_view = 4;
-  stage.scene.bands_per_bounce = 4;
+  const TurningCube cube(0.3);
+  FloorWorld stage(four_bands(), cube, Diffuse{}, 1, {ConstantLight{four_bands().even(1)}});
+  stage.scene.bands_per_view = stage.scene.bands_per_bounce = region_bands;
   for (const Vector3d& to : {Vector3d(0, 0, 0), Vector3d(0.1, 0, -0.8), Vector3d(0.9, 0.4, -0.8)}) {
     const Mean mean = seen(stage.scene, {}, {0, -3, 1.5}, to, 4000);
     EXPECT_NEAR(mean.mean(), 1, 5 * mean.error() + 1e-9);
@@ -86,9 +32,8 @@ TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
 }
 
 TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
-  RegionStage stage({region_lamp(), ConstantLight{even_reflectance(0.2f)}});
-  const TurningBall ball(0.4, 1.5);
-  stage.scene.region = &ball;
+  const TurningCube cube(0.4, 1.5);
+  FloorWorld stage(four_bands(), cube, Diffuse{}, 0.6, {region_lamp(), ConstantLight{four_bands().even(0.2f)}});
   std::vector<Mean> means;
   for (const int count : {1, 2, 4}) {
     stage.scene.bands_per_view = stage.scene.bands_per_bounce = count;
@@ -99,9 +44,8 @@ TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
 }
 
 TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
-  RegionStage stage({region_lamp(), ConstantLight{even_reflectance(0.2f)}});
-  const TurningBall ball(0.4, 1.5);
-  stage.scene.region = &ball;
+  const TurningCube cube(0.4, 1.5);
+  FloorWorld stage(four_bands(), cube, Diffuse{}, 0.6, {region_lamp(), ConstantLight{four_bands().even(0.2f)}});
   stage.scene.bands_per_view = 2;
   stage.scene.group_of_light = {0, 1};
   stage.scene.groups = 2;
@@ -134,10 +78,9 @@ TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
 
 /// Rays that do not arrive count as 0 in the sums, and not in the means.
 TEST(BendingRegionTest, MeansAreOfTheRaysThatArrive) {
-  RegionStage stage({ConstantLight{even_reflectance(1)}});
-  TurningBall ball(0.01, 1.5);
-  ball.lost_band = 3;
-  stage.scene.region = &ball;
+  TurningCube cube(0.01, 1.5);
+  cube.lost_band = 3;
+  FloorWorld stage(four_bands(), cube, Diffuse{}, 0.6, {ConstantLight{four_bands().even(1)}});
   stage.scene.bands_per_view = region_bands;
   RayShader shader(stage.scene, {});
   shader.shade({{{0, -3, 0}, {0, 1, 0}, {3, 0, 0, 0}}}, true);
@@ -149,11 +92,8 @@ TEST(BendingRegionTest, MeansAreOfTheRaysThatArrive) {
 
 /// A directional light reaches no surface through the region, because landed light has it; the camera still sees it.
 TEST(BendingRegionTest, AnIrradianceMapReplacesTheSunBehindTheRegion) {
-  DirectionalLight sun;
-  sun.irradiance = even_reflectance(2);
-  RegionStage stage({sun});
-  const TurningBall ball(0.1);
-  stage.scene.region = &ball;
+  const TurningCube cube(0.1);
+  FloorWorld stage(four_bands(), cube, Diffuse{}, 0.6, {DirectionalLight{{0, 0, -1}, four_bands().even(2), 0}});
   const auto radiance = [&](const Vector3d& to) { return seen(stage.scene, {}, {0, -3, 1}, to, 100).mean(); };
   const Vector3d below(0.1, 0.1, -0.8), beside(0.9, 0.1, -0.8);
   EXPECT_EQ(radiance(below), 0);
@@ -170,14 +110,14 @@ TEST(BendingRegionTest, AnIrradianceMapReplacesTheSunBehindTheRegion) {
   EXPECT_EQ(radiance(below), 0);
 }
 
-/// A room that emits, about the ball. Every surface sends on half of the light, in all bands alike.
+/// A room that emits, about the cube. Every surface sends on half of the light, in all bands alike.
 TEST(BendingRegionTest, BentLightIsLimitedInAllBandsAlike) {
   TriangleMesh room = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, Eigen::Affine3d::Identity());
   for (auto& triangle : room.triangles) std::swap(triangle[1], triangle[2]);  // They face inwards.
   World world(four_bands(), {surface_of(room, 0, 0)}, {make_material(Diffuse{}, four_bands().grey(0.5))},
-              {AreaLight{room, even_reflectance(8)}});
-  const TurningBall ball(0.7);
-  world.scene.region = &ball;
+              {AreaLight{room, four_bands().even(8)}});
+  const TurningCube cube(0.7);
+  world.scene.region = &cube;
   ShadingSettings settings;
   settings.direct = DirectLight::material;  // Each contribution is 8 / 2^depth.
   settings.roulette_depth = 100;
