@@ -35,9 +35,7 @@ class Hdf5Writer {
 
   /// A dataset that has a shape, and no numbers yet.
   void announce(const std::string& name, const std::vector<hsize_t>& shape) {
-    const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr);
-    H5Dclose(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, with_groups_, H5P_DEFAULT, H5P_DEFAULT));
-    H5Sclose(space);
+    write(name, shape, nullptr, H5T_NATIVE_DOUBLE, H5T_IEEE_F64LE);
   }
 
   void text(const std::string& name, const std::string& value) {
@@ -56,22 +54,12 @@ class Hdf5Writer {
 
   void attribute(const std::string& object, const std::string& name, const std::vector<double>& values) {
     const hsize_t count = values.size();
-    const hid_t space = H5Screate_simple(1, &count, nullptr);
-    const hid_t id = H5Acreate_by_name(file_, object.c_str(), name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT,
-                                       H5P_DEFAULT, H5P_DEFAULT);
-    EXPECT_GE(H5Awrite(id, H5T_NATIVE_DOUBLE, values.data()), 0);
-    H5Aclose(id);
-    H5Sclose(space);
+    attribute(object, name, values.data(), H5T_NATIVE_DOUBLE, H5Screate_simple(1, &count, nullptr));
   }
-
   void attribute(const std::string& object, const std::string& name, const std::string& text) {
-    const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
+    const hid_t type = H5Tcopy(H5T_C_S1);
     H5Tset_size(type, text.size());
-    const hid_t id =
-        H5Acreate_by_name(file_, object.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    EXPECT_GE(H5Awrite(id, type, text.data()), 0);
-    H5Aclose(id);
-    H5Sclose(space);
+    attribute(object, name, text.data(), type, H5Screate(H5S_SCALAR));
     H5Tclose(type);
   }
 
@@ -80,8 +68,17 @@ class Hdf5Writer {
              hid_t stored) {
     const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr);
     const hid_t data = H5Dcreate2(file_, name.c_str(), stored, space, with_groups_, H5P_DEFAULT, H5P_DEFAULT);
-    EXPECT_GE(H5Dwrite(data, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), 0);
+    EXPECT_TRUE(!values || H5Dwrite(data, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
     H5Dclose(data);
+    H5Sclose(space);
+  }
+
+  /// Closes `space`.
+  void attribute(const std::string& object, const std::string& name, const void* values, hid_t type, hid_t space) {
+    const hid_t id =
+        H5Acreate_by_name(file_, object.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    EXPECT_GE(H5Awrite(id, type, values), 0);
+    H5Aclose(id);
     H5Sclose(space);
   }
 

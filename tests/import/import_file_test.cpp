@@ -3,12 +3,9 @@
 #include <functional>
 
 #include <vtkDoubleArray.h>
-#include <vtkPointData.h>
-#include <vtkPoints.h>
 
 #include "tests/import/hdf5_writer.h"
 #include "tests/import/imported.h"
-#include "tests/import/mesh_files.h"
 #include "tests/import/openfoam_case.h"
 #include "tests/import/vtk_files.h"
 
@@ -29,29 +26,6 @@ TEST(ImportFileTest, FlatCellsAreTakenInSilence) {
   settings.sampling.resolution = 5;
   error_of([&] { imported(folder / "a.vtu", settings); });
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-}
-
-TEST(ImportFileTest, NumPyVoxelsAreWhereTheUserSays) {
-  const TemporaryFolder folder;
-  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 4, 3, 3), }";
-  header.resize(117, ' ');
-  const std::vector<float> ones(2 * 3 * 4 * 9, 1.0F);
-  write_bytes(folder / "a.npy", std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header + "\n" +
-                                    std::string(reinterpret_cast<const char*>(ones.data()), ones.size() * 4));
-  ImportSettings settings;
-  const auto read = [&] { return imported(folder / "a.npy", settings).grid; };
-  EXPECT_TRUE(read().to_world.matrix().isIdentity());
-  settings.sampling.resolution = 0.25;
-  settings.origin = Eigen::Vector3d(-1, 2, 5);
-  const TensorGrid grid = read();
-  EXPECT_EQ(Vector3d(grid.to_world * Vector3d::Zero()), Vector3d(-1, 2, 5));
-  EXPECT_EQ(Vector3d(grid.to_world * Vector3d(3, 2, 1)), Vector3d(-0.25, 2.5, 5.25));
-  EXPECT_EQ(grid.active_voxels(), 24u);
-  settings.voxel = Eigen::Vector3d(0.5, 0.25, 2);
-  EXPECT_EQ(Vector3d(read().to_world * Vector3d(3, 2, 1)), Vector3d(0.5, 2.5, 7));
-  settings.voxel.reset();
-  settings.sampling.bounds = Eigen::AlignedBox3d(Vector3d(-1, 2, 5), Vector3d(-0.75, 2.5, 5));
-  EXPECT_EQ(read().active_voxels(), 6u);  // The bounds are in world space.
 }
 
 /// Its values are at points or at cells; arrays of more than one number do not count.

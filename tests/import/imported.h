@@ -1,6 +1,9 @@
 #pragma once
 /// What is imported of a file.
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "base/process/progress.h"
 #include "tests/import/mesh_fixtures.h"
 #include "tools/import/import_file.h"
@@ -14,24 +17,17 @@ struct Imported {
   std::size_t voxels() const { return grid.active_voxels(); }
 
   /// The tensor of all voxels, which must be the same but for `tolerance`.
-  Eigen::Matrix3d tensor(double tolerance = 1e-5) const {
-    Eigen::Matrix3d first = Eigen::Matrix3d::Constant(NAN);
-    mesh_fixtures::for_each_voxel(grid, [&](const auto&, const Eigen::Matrix3d& value) {
+  Matrix3d tensor(double tolerance = 1e-5) const {
+    Matrix3d first = Matrix3d::Constant(NAN);
+    mesh_fixtures::for_each_voxel(grid, [&](const auto&, const Matrix3d& value) {
       if (first.hasNaN()) first = value;
       EXPECT_LT((value - first).norm(), tolerance);
     });
     return first;
   }
 
-  std::string notes() const { return joined(report.notes); }
-  std::string warnings() const { return joined(report.warnings); }
-
- private:
-  static std::string joined(const std::vector<std::string>& lines) {
-    std::string text;
-    for (const std::string& line : lines) text += line + "\n";
-    return text;
-  }
+  std::string notes() const { return fmt::format("{}", fmt::join(report.notes, "\n")); }
+  std::string warnings() const { return fmt::format("{}", fmt::join(report.warnings, "\n")); }
 };
 
 inline Imported imported(const ImportSettings& settings) {
@@ -45,11 +41,13 @@ inline Imported imported(const std::filesystem::path& file, ImportSettings setti
   return imported(settings);
 }
 
-/// The settings of an array, and of voxels of a size if one is given.
-inline ImportSettings array_settings(const std::string& array, Take take = Take::tensor, double voxel = 0) {
+/// The settings of an array, and of voxels of a size if one is given, and a step.
+inline ImportSettings array_settings(const std::string& array, Take take = Take::tensor, double voxel = 0,
+                                     std::optional<int> step = {}) {
   ImportSettings settings;
   settings.array = array;
   settings.take = take;
+  settings.step = step;
   if (voxel > 0) settings.sampling.resolution = voxel;
   return settings;
 }

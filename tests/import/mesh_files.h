@@ -51,8 +51,7 @@ std::string error_of(Act&& act) {
 /// message, and not the end of all other tests. Other exceptions count as well.
 template <typename Act>
 std::string error_in_child(const std::filesystem::path& path, Act&& act) {
-  int ends[2];
-  EXPECT_EQ(pipe(ends), 0);
+  const Temporary said("said_by_child");
   const pid_t child = fork();
   if (child == 0) {
     limit_memory();
@@ -64,20 +63,14 @@ std::string error_in_child(const std::filesystem::path& path, Act&& act) {
     } catch (const std::exception& error) {
       text = error.what();
     }
-    _exit(write(ends[1], text.data(), text.size()) == static_cast<ssize_t>(text.size()) ? 0 : 1);
+    write_bytes(said, text);
+    _exit(bytes_of(said) == text ? 0 : 1);
   }
-  close(ends[1]);
-  std::string text(4096, '\0');
-  std::size_t size = 0;
-  for (ssize_t count = 1; count > 0 && size < text.size();
-       size += static_cast<std::size_t>(std::max<ssize_t>(0, count)))
-    count = read(ends[0], &text[size], text.size() - size);
-  close(ends[0]);
   int status = 0;
   waitpid(child, &status, 0);
   if (WIFSIGNALED(status)) return path.string() + ": reading it ended the reader";
   EXPECT_EQ(WEXITSTATUS(status), 0);
-  text.resize(size);
+  std::string text = bytes_of(said);
   EXPECT_EQ(text.find('\n'), std::string::npos) << text;
   return text;
 }

@@ -2,12 +2,12 @@
 /// Meshes of a few cells with known shapes and values.
 
 #include <functional>
-#include <utility>
 
 #include <vtkCellData.h>
 #include <vtkCellType.h>
 #include <vtkDataSet.h>
 #include <vtkDoubleArray.h>
+#include <vtkIdList.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
@@ -27,11 +27,10 @@ using Grid = vtkSmartPointer<vtkUnstructuredGrid>;
 inline vtkSmartPointer<vtkStructuredGrid> curvilinear(const Vector3i& nodes, const Map& map) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
-  for (int k = 0; k < nodes.z(); ++k)
-    for (int j = 0; j < nodes.y(); ++j)
-      for (int i = 0; i < nodes.x(); ++i)
-        points->InsertNextPoint(
-            map(Vector3d(i, j, k).cwiseQuotient((nodes.array() - 1).cast<double>().matrix())).data());
+  for (int i = 0; i < nodes.prod(); ++i) {
+    const Vector3d index(i % nodes.x(), i / nodes.x() % nodes.y(), i / nodes.x() / nodes.y());
+    points->InsertNextPoint(map(index.cwiseQuotient((nodes - Vector3i::Ones()).cast<double>())).data());
+  }
   auto grid = vtkSmartPointer<vtkStructuredGrid>::New();
   grid->SetDimensions(nodes.data());
   grid->SetPoints(points);
@@ -46,49 +45,41 @@ inline Vector3d bent(const Vector3d& p) {
   return p + s * Vector3d(1, -0.7, 0.5);
 }
 
+inline std::vector<Vector3d> cube_corners() {
+  return {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+}
+
 /// The unit cube, divided into n³ cubes. Each cube becomes a hexahedron, 2 wedges, 6 pyramids, 6 tetrahedra or a
 /// quadratic hexahedron, or is divided into quadratic tetrahedra.
 inline Grid unit_cube(int cell_type, int n, const Map& map) {
+  using Numbers = std::vector<std::vector<std::size_t>>;
+  Numbers cells{{0, 1, 2, 3, 4, 5, 6, 7}};  // Their corners among those of a cube, whose middle is number 8.
+  if (cell_type == VTK_WEDGE) cells = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 4, 6, 7}};
+  if (cell_type == VTK_PYRAMID)
+    cells = {{0, 1, 2, 3, 8}, {7, 6, 5, 4, 8}, {0, 4, 5, 1, 8}, {1, 5, 6, 2, 8}, {2, 6, 7, 3, 8}, {3, 7, 4, 0, 8}};
+  if (cell_type == VTK_TETRA || cell_type == VTK_QUADRATIC_TETRA)
+    cells = {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
+  Numbers edges;  // With points in their middles.
+  if (cell_type == VTK_QUADRATIC_TETRA) edges = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+  if (cell_type == VTK_QUADRATIC_HEXAHEDRON)
+    edges = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
   auto grid = Grid::New();
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   grid->SetPoints(points);
-  const auto cell = [&](int type, std::vector<Vector3d> corners) {
-    std::vector<vtkIdType> ids;
-    for (const Vector3d& corner : corners) ids.push_back(points->InsertNextPoint(map(corner).data()));
-    grid->InsertNextCell(type, static_cast<vtkIdType>(ids.size()), ids.data());
-  };
-  const auto with_middles = [](std::vector<Vector3d> c, const std::vector<std::pair<int, int>>& edges) {
-    for (const auto& [a, b] : edges)
-      c.push_back(0.5 * (c[static_cast<std::size_t>(a)] + c[static_cast<std::size_t>(b)]));
-    return c;
-  };
-  const std::vector<std::vector<std::size_t>> tetrahedra{{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6},
-                                                         {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
-  const std::vector<std::vector<std::size_t>> faces{{0, 1, 2, 3}, {7, 6, 5, 4}, {0, 4, 5, 1},
-                                                    {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}};
   for (int i = 0; i < n * n * n; ++i) {
-    std::vector<Vector3d> c;
-    for (const auto& corner : {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(1, 1, 0), Vector3d(0, 1, 0),
-                               Vector3d(0, 0, 1), Vector3d(1, 0, 1), Vector3d(1, 1, 1), Vector3d(0, 1, 1)})
-      c.push_back((corner + Vector3d(i % n, i / n % n, i / n / n)) / n);
-    if (cell_type == VTK_HEXAHEDRON || cell_type == VTK_LAGRANGE_HEXAHEDRON) cell(cell_type, c);
-    if (cell_type == VTK_WEDGE) {
-      cell(cell_type, {c[0], c[1], c[2], c[4], c[5], c[6]});
-      cell(cell_type, {c[0], c[2], c[3], c[4], c[6], c[7]});
+    std::vector<Vector3d> corners;
+    for (const Vector3d& corner : cube_corners())
+      corners.push_back((corner + Vector3d(i % n, i / n % n, i / n / n)) / n);
+    corners.push_back(0.5 * (corners[0] + corners[6]));
+    for (const auto& numbers : cells) {
+      std::vector<Vector3d> of_cell;
+      for (const std::size_t number : numbers) of_cell.push_back(corners[number]);
+      for (const auto& edge : edges) of_cell.push_back(0.5 * (of_cell[edge[0]] + of_cell[edge[1]]));
+      vtkNew<vtkIdList> ids;
+      for (const Vector3d& p : of_cell) ids->InsertNextId(points->InsertNextPoint(map(p).data()));
+      grid->InsertNextCell(cell_type, ids);
     }
-    if (cell_type == VTK_PYRAMID)
-      for (const auto& f : faces) cell(cell_type, {c[f[0]], c[f[1]], c[f[2]], c[f[3]], 0.5 * (c[0] + c[6])});
-    if (cell_type == VTK_TETRA)
-      for (const auto& t : tetrahedra) cell(cell_type, {c[t[0]], c[t[1]], c[t[2]], c[t[3]]});
-    if (cell_type == VTK_QUADRATIC_TETRA)
-      for (const auto& t : tetrahedra)
-        cell(cell_type,
-             with_middles({c[t[0]], c[t[1]], c[t[2]], c[t[3]]}, {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}));
-    if (cell_type == VTK_QUADRATIC_HEXAHEDRON)
-      cell(cell_type,
-           with_middles(
-               c, {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}));
   }
   return grid;
 }
@@ -100,12 +91,8 @@ void add_array(vtkDataSet& mesh, const std::string& name,
   vtkNew<vtkDoubleArray> array;
   array->SetName(name.c_str());
   array->SetNumberOfComponents(components);
-  array->SetNumberOfTuples(mesh.GetNumberOfPoints());
-  for (vtkIdType i = 0; i < mesh.GetNumberOfPoints(); ++i) {
-    Vector3d position;
-    mesh.GetPoint(i, position.data());
-    array->SetTuple(i, value(position).eval().data());
-  }
+  for (vtkIdType i = 0; i < mesh.GetNumberOfPoints(); ++i)
+    array->InsertNextTuple(value(Vector3d(mesh.GetPoint(i))).data());
   mesh.GetPointData()->AddArray(array);
 }
 

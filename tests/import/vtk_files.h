@@ -4,20 +4,13 @@
 #include <optional>
 #include <utility>
 
-#include <vtkCellData.h>
 #include <vtkDataSetWriter.h>
-#include <vtkDoubleArray.h>
 #include <vtkImageData.h>
-#include <vtkNew.h>
-#include <vtkPointData.h>
-#include <vtkPoints.h>
 #include <vtkRectilinearGrid.h>
-#include <vtkSmartPointer.h>
-#include <vtkStructuredGrid.h>
-#include <vtkUnstructuredGrid.h>
 #include <vtkXMLDataSetWriter.h>
 
 #include "tests/import/mesh_files.h"
+#include "tests/import/mesh_fixtures.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
@@ -39,21 +32,12 @@ inline double number(const double* x, int c) { return 3 * x[0] - 5 * x[1] + 7 * 
 /// Adds the point array "tensor" with nine components and the cell array "rate" with three.
 template <typename Set>
 inline vtkSmartPointer<Set> with_arrays(vtkSmartPointer<Set> set) {
-  vtkNew<vtkDoubleArray> tensor, rate;
-  tensor->SetName("tensor");
-  tensor->SetNumberOfComponents(9);
-  tensor->SetNumberOfTuples(set->GetNumberOfPoints());
-  for (vtkIdType i = 0; i < set->GetNumberOfPoints(); ++i) {
-    for (int c = 0; c < 9; ++c) tensor->SetComponent(i, c, number(set->GetPoint(i), c));
-  }
-  rate->SetName("rate");
-  rate->SetNumberOfComponents(3);
-  rate->SetNumberOfTuples(set->GetNumberOfCells());
-  for (vtkIdType i = 0; i < set->GetNumberOfCells(); ++i) {
-    for (int c = 0; c < 3; ++c) rate->SetComponent(i, c, static_cast<double>(i) + 0.25 * c);
-  }
-  set->GetPointData()->AddArray(tensor);
-  set->GetCellData()->AddArray(rate);
+  using Numbers = Eigen::Matrix<double, 9, 1>;
+  mesh_fixtures::add_array<9>(*set, "tensor", [](const Vector3d& x) {
+    return Numbers(Numbers::LinSpaced(0, 8).array() + number(x.data(), 0));
+  });
+  mesh_fixtures::add_cell_array<3>(
+      *set, "rate", [](vtkIdType i) { return Vector3d(Vector3d(0, 0.25, 0.5).array() + static_cast<double>(i)); });
   return set;
 }
 
@@ -85,14 +69,8 @@ inline vtkSmartPointer<vtkRectilinearGrid> rectilinear() {
 }
 
 inline vtkSmartPointer<vtkStructuredGrid> structured() {
-  auto set = vtkSmartPointer<vtkStructuredGrid>::New();
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (int i = 0; i < 4 * 3 * 2; ++i)
-    points->InsertNextPoint(i % 4 + 0.1 * (i / 12), i / 4 % 3, i / 12 + 0.2 * (i % 4));
-  set->SetDimensions(4, 3, 2);
-  set->SetPoints(points);
-  return with_arrays(set);
+  return with_arrays(mesh_fixtures::curvilinear(
+      {4, 3, 2}, [](const Vector3d& p) { return Vector3d(3 * p.x() + 0.1 * p.z(), 2 * p.y(), p.z() + 0.6 * p.x()); }));
 }
 
 /// A bar of unit cubes along x that begins at `first`.
@@ -100,9 +78,8 @@ inline vtkSmartPointer<vtkUnstructuredGrid> bar(int first, int cubes) {
   auto set = vtkSmartPointer<vtkUnstructuredGrid>::New();
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
-  for (int i = 0; i <= cubes; ++i) {
+  for (int i = 0; i <= cubes; ++i)
     for (int corner = 0; corner < 4; ++corner) points->InsertNextPoint(first + i, corner % 2, corner / 2);
-  }
   set->SetPoints(points);
   for (vtkIdType i = 0; i < cubes; ++i) {
     const vtkIdType p = 4 * i, corners[8] = {p, p + 4, p + 5, p + 1, p + 2, p + 6, p + 7, p + 3};
@@ -140,13 +117,12 @@ inline void expect_same(vtkDataSet& read, vtkDataSet& written, double tolerance)
   vtkDataArray* const rate = read.GetCellData()->GetArray("rate");
   ASSERT_TRUE(tensor && rate);
   for (vtkIdType i = 0; i < read.GetNumberOfPoints(); ++i) {
-    const Eigen::Vector3d x(read.GetPoint(i)), expected(written.GetPoint(i));
+    const Vector3d x(read.GetPoint(i)), expected(written.GetPoint(i));
     EXPECT_LT((x - expected).norm(), tolerance);
     for (int c = 0; c < 9; ++c) EXPECT_NEAR(tensor->GetComponent(i, c), number(expected.data(), c), tolerance);
   }
-  for (vtkIdType i = 0; i < read.GetNumberOfCells(); ++i) {
+  for (vtkIdType i = 0; i < read.GetNumberOfCells(); ++i)
     EXPECT_NEAR(rate->GetComponent(i, 2), static_cast<double>(i) + 0.5, tolerance);
-  }
 }
 
 inline std::vector<std::pair<std::string, vtkSmartPointer<vtkDataSet>>> data_sets() {

@@ -27,9 +27,14 @@ std::vector<double> coordinates(int nodes, int axis, int first = 0) {
   return x;
 }
 
-/// A row of unit cubes from x = first on. At step k from 1 on, the gradient of v is k diag(1, 2, 3), and the stress of
-/// all cells is k (11, 22, 33, 12, 23, 13). @param mode  EX_LARGE_MODEL or EX_NETCDF4.
-void write_bar(const FilePath& path, int steps, int mode = EX_LARGE_MODEL, int first = 0, int cubes = 2) {
+/// Of cells: their names, and their values at the first step.
+using Variables = std::vector<std::pair<std::string, double>>;
+const Variables of_stress{{"s_xx", 11}, {"s_yy", 22}, {"s_zz", 33}, {"s_xy", 12}, {"s_yz", 23}, {"s_xz", 13}};
+
+/// A row of unit cubes from x = first on. At step k from 1 on, the gradient of v is k diag(1, 2, 3), and the variables
+/// of all cells are k times those given. @param mode  EX_LARGE_MODEL or EX_NETCDF4.
+void write_bar(const FilePath& path, int steps, const Variables& variables = of_stress, int mode = EX_LARGE_MODEL,
+               int first = 0, int cubes = 2) {
   int word = 8, stored = 8;
   const int file = ex_create(path.c_str(), EX_CLOBBER | mode, &word, &stored), nodes = 4 * (cubes + 1);
   ASSERT_GE(file, 0);
@@ -41,14 +46,12 @@ void write_bar(const FilePath& path, int steps, int mode = EX_LARGE_MODEL, int f
   ex_put_coord(file, x[0].data(), x[1].data(), x[2].data());
   ex_put_block(file, EX_ELEM_BLOCK, 7, "HEX8", cubes, 8, 0, 0, 0);
   ex_put_conn(file, EX_ELEM_BLOCK, 7, corners.data(), nullptr, nullptr);
+  const int count = static_cast<int>(variables.size());
   ex_put_variable_param(file, EX_NODAL, 3);
-  ex_put_variable_param(file, EX_ELEM_BLOCK, 6);
-  const std::array<const char*, 6> stress{"s_xx", "s_yy", "s_zz", "s_xy", "s_yz", "s_xz"};
-  const std::array<double, 6> components{11, 22, 33, 12, 23, 13};
+  ex_put_variable_param(file, EX_ELEM_BLOCK, count);
   for (int i = 0; i < 3; ++i) ex_put_variable_name(file, EX_NODAL, i + 1, std::array{"v_x", "v_y", "v_z"}[i]);
-  for (int i = 0; i < 6; ++i) ex_put_variable_name(file, EX_ELEM_BLOCK, i + 1, stress[i]);
-  std::vector<int> table(6, 1);
-  ex_put_truth_table(file, EX_ELEM_BLOCK, 1, 6, table.data());
+  for (int i = 0; i < count; ++i) ex_put_variable_name(file, EX_ELEM_BLOCK, i + 1, variables[i].first.c_str());
+  ex_put_truth_table(file, EX_ELEM_BLOCK, 1, count, std::vector<int>(variables.size(), 1).data());
   for (int step = 1; step <= steps; ++step) {
     const double time = 0.5 * step;
     ex_put_time(file, step, &time);
@@ -57,8 +60,10 @@ void write_bar(const FilePath& path, int steps, int mode = EX_LARGE_MODEL, int f
       for (double& value : values) value *= step * (i + 1);
       ex_put_var(file, step, EX_NODAL, i + 1, 1, nodes, values.data());
     }
-    for (int i = 0; i < 6; ++i)
-      ex_put_var(file, step, EX_ELEM_BLOCK, i + 1, 7, cubes, std::vector<double>(cubes, step * components[i]).data());
+    for (int i = 0; i < count; ++i) {
+      const std::vector<double> values(cubes, step * variables[i].second);
+      ex_put_var(file, step, EX_ELEM_BLOCK, i + 1, 7, cubes, values.data());
+    }
   }
   ex_close(file);
 }
@@ -73,17 +78,13 @@ void change(const FilePath& path, const std::function<void(int)>& act) {
 /// Writes a value to all numbers of a variable at a step, from 1 on.
 void fill(const FilePath& path, const std::string& name, std::size_t step, double value = NC_FILL_DOUBLE) {
   change(path, [&](int file) {
-    int id = -1, rank = 0, dimensions[8];
+    int id = -1, rank = 0, dimensions[2];
     ASSERT_EQ(nc_inq_varid(file, name.c_str(), &id), NC_NOERR) << name;
     nc_inq_var(file, id, nullptr, nullptr, &rank, dimensions, nullptr);
-    std::vector<std::size_t> start(rank, 0), count(rank, 1);
-    std::size_t size = 1;
-    for (int i = 1; i < rank; ++i) {
-      nc_inq_dimlen(file, dimensions[i], &count[i]);
-      size *= count[i];
-    }
-    start[0] = step - 1;
-    nc_put_vara_double(file, id, start.data(), count.data(), std::vector<double>(size, value).data());
+    const std::size_t start[] = {step - 1, 0};
+    std::size_t count[] = {1, 1};
+    if (rank == 2) nc_inq_dimlen(file, dimensions[1], &count[1]);
+    nc_put_vara_double(file, id, start, count, std::vector<double>(count[1], value).data());
   });
 }
 
@@ -98,9 +99,8 @@ void set_aside(const FilePath& path, const std::string& name) {
 
 /// Imports pieces of one mesh with voxels of 1/2.
 Imported import(const std::vector<FilePath>& files, const std::string& array, Take take, std::optional<int> step = {}) {
-  ImportSettings settings = array_settings(array, take, 0.5);
+  ImportSettings settings = array_settings(array, take, 0.5, step);
   settings.files = files;
-  settings.step = step;
   return imported(settings);
 }
 
@@ -112,12 +112,11 @@ const char* const stress_list = "s_xx,s_yy,s_zz,s_xy,s_yz,s_xz";
 
 /// Expects v and the stress of a step, from 1 on. @return the notes.
 std::string expect_step(const FilePath& path, int step, std::optional<int> asked = {}) {
-  Matrix3d stress;
-  stress << 11, 12, 13, 12, 22, 23, 13, 23, 33;
-  const Matrix3d gradient = Eigen::Vector3d(1, 2, 3).asDiagonal();
+  const Matrix3d tensor = (Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished();
+  const Matrix3d gradient = Vector3d(1, 2, 3).asDiagonal();
   const Imported v = import({path}, "v_", Take::gradient, asked), s = import({path}, stress_list, Take::tensor, asked);
   EXPECT_LT((v.tensor() - step * gradient).norm(), 1e-5) << path;
-  EXPECT_LT((s.tensor() - step * stress).norm(), 1e-4) << path;
+  EXPECT_LT((s.tensor() - step * tensor).norm(), 1e-4) << path;
   EXPECT_EQ(v.notes(), s.notes());
   return v.notes();
 }
@@ -146,7 +145,7 @@ TEST(Exodus, TheLastCompleteStepIsTaken) {
                         "its time"}};
   for (const int mode : modes)
     for (const Row& row : table) {
-      write_bar(path, 4, mode);
+      write_bar(path, 4, of_stress, mode);
       row.spoil();
       const std::string notes = expect_step(path, row.last);
       EXPECT_THAT(notes, HasSubstr("step " + std::to_string(row.last) + " of 4 is taken")) << row.name;
@@ -209,12 +208,43 @@ TEST(Exodus, VariablesThatAreNotThereAreLeftOut) {
   EXPECT_THAT(refusal(path, "v_", Take::gradient), left_out("meshio convert a.e FILE.vtu"));
 }
 
+/// In alphabetical order, as MOOSE writes them; VTK joins those that it can.
+TEST(Exodus, VariablesKeepTheirNames) {
+  const TemporaryFolder folder;
+  const FilePath six = folder / "six.e", nine = folder / "nine.e";
+  write_bar(six, 1, {{"t_xx", 1}, {"t_xy", 0.2}, {"t_xz", 0.3}, {"t_yy", 2}, {"t_yz", 0.4}, {"t_zz", 3}});
+  Variables rows;
+  for (int i = 0; i < 9; ++i) rows.emplace_back(std::string("t_") + "xyz"[i / 3] + "xyz"[i % 3], i + 1);
+  write_bar(nine, 1, rows);
+  const Matrix3d of_six = (Matrix3d() << 1, 0.2, 0.3, 0.2, 2, 0.4, 0.3, 0.4, 3).finished();
+  const Matrix3d of_nine = (Matrix3d() << 1, 2, 3, 4, 5, 6, 7, 8, 9).finished();
+  const Matrix3d upper = (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished();
+  struct Row {
+    FilePath file;
+    const char* list;
+    Matrix3d tensor;
+    std::optional<TensorOrder> order = {};
+  };
+  for (const Row& row : {Row{six, "t_xx,t_yy,t_zz,t_xy,t_yz,t_xz", of_six},
+                         {six, "t_xx,t_xy,t_xz,t_yy,t_yz,t_zz", of_six},
+                         {nine, "t_x, t_y, t_z", of_nine},
+                         {nine, "t_xx,t_xy,t_xz,t_yx,t_yy,t_yz,t_zx,t_zy,t_zz", of_nine},
+                         {nine, "t_x:0,t_y:1,t_z:2,t_x:1,t_y:2,t_x:2", upper, TensorOrder::vtk},
+                         {nine, "t_x:t_xx,t_y:t_yy,t_z:t_zz,t_x:t_xy,t_y:t_yz,t_x:t_xz", upper}}) {
+    ImportSettings settings = array_settings(row.list);
+    settings.order = row.order;
+    EXPECT_LT((imported(row.file, settings).tensor(1e-6) - row.tensor).norm(), 1e-6) << row.list;
+  }
+  EXPECT_THAT([&] { import({nine}, "t_x:3,t_y,t_z", Take::tensor); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("no array \"t_x:3\"")));
+}
+
 TEST(Exodus, PiecesOfNemesisAreOneMesh) {
   const TemporaryFolder folder;
   const FilePath first = folder / "out.e.2.0", second = folder / "out.e.2.1";
   for (const int mode : modes) {
-    write_bar(first, 3, mode, 0, 2);
-    write_bar(second, 3, mode, 2, 3);
+    write_bar(first, 3, of_stress, mode, 0, 2);
+    write_bar(second, 3, of_stress, mode, 2, 3);
     for (const std::vector<FilePath>& files : {std::vector{first}, {second}, {first, second}, {second, first}}) {
       const Imported all = import(files, "v_", Take::gradient);
       EXPECT_EQ(all.report.mesh_cells, 5u);
@@ -224,7 +254,7 @@ TEST(Exodus, PiecesOfNemesisAreOneMesh) {
     }
     EXPECT_EQ(read_vtk_source(first)->GetNumberOfPoints(), 24);  // Those between both are the same.
   }
-  write_bar(second, 2, EX_LARGE_MODEL, 2, 3);
+  write_bar(second, 2, of_stress, EX_LARGE_MODEL, 2, 3);
   EXPECT_THAT(expect_step(first, 2), HasSubstr("step 2 of 3 is taken"));
   std::filesystem::remove(second);
   EXPECT_THAT(error_of([&] { import({first}, "v_", Take::gradient); }),
@@ -242,26 +272,13 @@ struct Cdf5 {
   std::uint64_t records = 0, name_length = 1, dimension = 10, attributes = 0, begin = 200;
 
   std::string bytes() const {
-    std::string bytes = std::string("CDF") + '\5';
-    const auto put32 = [&](std::uint32_t number) { append_number(number, ByteOrder::big, bytes); };
-    const auto put64 = [&](std::initializer_list<std::uint64_t> numbers) {
-      for (const std::uint64_t number : numbers) append_number(number, ByteOrder::big, bytes);
-    };
-    put64({records});
-    put32(10);  // The list of dimensions.
-    put64({1, name_length});
-    bytes += std::string("x\0\0\0", 4);
-    put64({dimension});
-    put32(attributes > 0 ? 12 : 0);
-    put64({attributes});
-    put32(11);  // The list of variables.
-    put64({1, 1});
-    bytes += std::string("x\0\0\0", 4);
-    put64({1, 0});  // It has one dimension: the first.
-    put32(0);
-    put64({0});
-    put32(6);  // Type: double.
-    put64({80, begin});
+    std::string bytes = "CDF\5";
+    const auto put = [&](auto... numbers) { (append_number(numbers, ByteOrder::big, bytes), ...); };
+    const std::uint64_t none = 0, one = 1, size = 80;
+    const std::uint32_t name = 'x' << 24, dimensions = 10, variables = 11, has_attributes = attributes > 0 ? 12 : 0;
+    put(records, dimensions, one, name_length, name, dimension, has_attributes, attributes);
+    // Its one dimension is the first, and it has no attributes; 6 are doubles.
+    put(variables, one, one, name, one, none, 0u, none, 6u, size, begin);
     return bytes;
   }
 };

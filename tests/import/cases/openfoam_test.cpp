@@ -1,16 +1,10 @@
 // Gradients of velocities in cases of OpenFOAM: patches are walls, polyhedra are whole, processors are one mesh.
 
-#include <array>
 #include <functional>
 #include <map>
-#include <tuple>
-#include <utility>
 
 #include <fmt/format.h>
-#include <vtkCellData.h>
-#include <vtkPointData.h>
 
-#include "tests/import/mesh_files.h"
 #include "tests/import/openfoam_case.h"
 #include "tests/import/velocity_meshes.h"
 #include "tests/import/vtk_files.h"
@@ -30,63 +24,30 @@ std::string foam_row(const Vector3d& v) { return fmt::format("({:.17g} {:.17g} {
 using Patches = std::map<std::string, std::string>;
 
 /// A case of OpenFOAM with the cells and the array U of `grid`. @param patch_of  The patch of a face at a place.
-void write_foam(const std::filesystem::path& folder, vtkUnstructuredGrid& grid, const Patches& patches,
+void write_foam(const fs::path& folder, vtkUnstructuredGrid& grid, const Patches& patches,
                 const std::function<std::string(const Vector3d&)>& patch_of) {
-  struct Side {
-    vtkIdType owner = 0, neighbour = -1;
-    std::string row, patch;
-  };
-  std::map<std::vector<vtkIdType>, Side> sides;
-  for (vtkIdType id = 0; id < grid.GetNumberOfCells(); ++id)
+  std::vector<std::string> points, values;
+  for (vtkIdType i = 0; i < grid.GetNumberOfPoints(); ++i) points.push_back(foam_row(Vector3d(grid.GetPoint(i))));
+  std::vector<OpenFoamCase::Face> faces;
+  for (vtkIdType id = 0; id < grid.GetNumberOfCells(); ++id) {
+    values.push_back(foam_row(Vector3d(grid.GetCellData()->GetArray("U")->GetTuple3(id))));
     for (int i = 0; i < grid.GetCell(id)->GetNumberOfFaces(); ++i) {
       vtkCell& face = *grid.GetCell(id)->GetFace(i);
-      const auto count = static_cast<int>(face.GetNumberOfPoints());
-      Eigen::Matrix3Xd corners(3, count);
-      std::vector<vtkIdType> ids, key;
-      for (int k = 0; k < count; ++k) {
-        ids.push_back(face.GetPointId(k));
+      Eigen::Matrix3Xd corners(3, face.GetNumberOfPoints());
+      std::vector<int> ids;
+      for (int k = 0; k < corners.cols(); ++k) {
+        ids.push_back(static_cast<int>(face.GetPointId(k)));
         corners.col(k) = Vector3d(face.GetPoints()->GetPoint(k));
       }
       const FaceMeasure measure = face_measure(corners);
       if (measure.area.dot(measure.centre - middle_of(*grid.GetCell(id))) < 0) std::reverse(ids.begin(), ids.end());
-      key = ids;
-      std::sort(key.begin(), key.end());
-      const auto [side, is_new] =
-          sides.try_emplace(key, Side{id, -1, std::to_string(count) + "(", patch_of(measure.centre)});
-      if (!is_new) side->second.neighbour = id;
-      for (const vtkIdType k : ids) side->second.row += is_new ? std::to_string(k) + " " : "";
-      side->second.row += is_new ? ")" : "";
+      faces.push_back({ids, patch_of(measure.centre), static_cast<int>(id)});
     }
-  std::vector<std::pair<std::tuple<bool, std::string, vtkIdType, vtkIdType>, Side>> order;
-  for (const auto& [key, side] : sides) {
-    const bool outer = side.neighbour < 0;
-    order.push_back({{outer, outer ? side.patch : "", side.owner, side.neighbour}, side});
-  }
-  std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  OpenFoamCase::Mesh mesh;
-  for (vtkIdType i = 0; i < grid.GetNumberOfPoints(); ++i) mesh.points.push_back(foam_row(Vector3d(grid.GetPoint(i))));
-  std::map<std::string, std::pair<std::size_t, std::size_t>> ranges;
-  for (const auto& [key, side] : order) {
-    const bool inner = side.neighbour >= 0;
-    auto& [start, count] = ranges.try_emplace(inner ? "" : side.patch, mesh.faces.size(), 0).first->second;
-    ++count;
-    mesh.faces.push_back(side.row);
-    mesh.owner.push_back(std::to_string(side.owner));
-    if (inner) mesh.neighbour.push_back(std::to_string(side.neighbour));
   }
   std::string entries;
-  for (const auto& [patch, range] : ranges) {
-    if (patch.empty()) continue;
-    const bool is_processor = patch.rfind("procBoundary", 0) == 0;
-    mesh.boundary.push_back(fmt::format("{} {{ type {}; nFaces {}; startFace {}; }}", patch,
-                                        is_processor ? "processor" : "patch", range.second, range.first));
+  for (const auto& [patch, count] : OpenFoamCase::write_mesh(folder, points, faces))
     if (!patches.at(patch).empty()) entries += patch + "\n{\n" + patches.at(patch) + "\n}\n";
-  }
-  OpenFoamCase::write_mesh(folder, mesh);
   OpenFoamCase::write_times(folder, "1");
-  std::vector<std::string> values;
-  for (vtkIdType i = 0; i < grid.GetNumberOfCells(); ++i)
-    values.push_back(foam_row(Vector3d(grid.GetCellData()->GetArray("U")->GetTuple3(i))));
   write_bytes(folder / "1" / "U", OpenFoamCase::head("volVectorField", "U") +
                                       "dimensions [0 1 -1 0 0 0 0];\ninternalField nonuniform List<vector>\n" +
                                       OpenFoamCase::list(values) + ";\nboundaryField\n{\n" + entries + "}\n");
@@ -109,11 +70,8 @@ TEST(OpenFoamWalls, PatchesOfOpenFoamAreWalls) {
   const std::string moving = "type movingWallVelocity;\nvalue uniform (1 0 0);", symmetric = "type symmetryPlane;";
   const std::string list = "type fixedValue;\nvalue nonuniform List<vector> 4((1 0 0) (1 0 0) (1 0 0) (1 0 0));";
   const auto only = [](int i, int j, const std::function<double(double)>& value) {
-    return [=](const Vector3d& p) {
-      Matrix3d result = Matrix3d::Zero();
-      result(i, j) = value(p.y());
-      return result;
-    };
+    const Matrix3d unit = Vector3d::Unit(i) * Vector3d::Unit(j).transpose();
+    return [=](const Vector3d& p) { return Matrix3d(value(p.y()) * unit); };
   };
   const auto one = only(0, 1, [](double) { return 1; });
   const auto couette = [](const Vector3d& p) { return Vector3d(p.y(), 0, 0); };
@@ -154,12 +112,12 @@ TEST(OpenFoamWalls, PolyhedraOfOpenFoamAreWhole) {
 TEST(OpenFoamWalls, ProcessorsAreAsGoodAsOneCase) {
   const TemporaryFolder folder;
   const auto parabola = [](const Vector3d& p) { return Vector3d(p.y() * (1 - p.y()) + 0.1 * p.x() * p.x(), 0, 0); };
-  const Patches patches{{"bottom", "type calculated;"},
-                        {"top", "type calculated;"},
-                        {"sides", "type slip;"},
-                        {"ends", "type calculated;"},
-                        {"procBoundary", "type processor;\nvalue uniform (9 9 9);"}};
-  const auto write = [&](const std::filesystem::path& path, double from, double to) {
+  const auto slope = [](const Vector3d& p) {
+    return Matrix3d(Vector3d::UnitX() * Vector3d(0.2 * p.x(), 1 - 2 * p.y(), 0).transpose());
+  };
+  const std::string any = "type calculated;", seam = "type processor;\nvalue uniform (9 9 9);";
+  const Patches patches{{"bottom", any}, {"top", any}, {"ends", any}, {"sides", "type slip;"}, {"procBoundary", seam}};
+  const auto write = [&](const fs::path& path, double from, double to) {
     const Grid grid = boxes(steps(from, to, static_cast<int>(2 * (to - from))), steps(0, 1, 4), steps(0, 1, 3));
     add_velocity(*grid, parabola);
     write_foam(path, *grid, patches,
@@ -168,16 +126,10 @@ TEST(OpenFoamWalls, ProcessorsAreAsGoodAsOneCase) {
   write(folder / "whole", 0, 4);
   write(folder / "parts" / "processor0", 0, 2);
   write(folder / "parts" / "processor1", 2, 4);
-  std::filesystem::rename(folder / "parts" / "processor0" / "system", folder / "parts" / "system");
+  fs::rename(folder / "parts" / "processor0" / "system", folder / "parts" / "system");
   const TensorGrid whole = gradients(folder / "whole", 0.2);
   expect_alike(gradients(folder / "parts", 0.2), whole, "parts");
-  EXPECT_LT(error_in(whole,
-                     [&](const Vector3d& p) {
-                       Matrix3d slope = Matrix3d::Zero();
-                       slope.row(0) << 0.2 * p.x(), 1 - 2 * p.y(), 0;
-                       return slope;
-                     }),
-            1e-3);
+  EXPECT_LT(error_in(whole, slope), 1e-3);
 }
 
 // OpenFOAM cases that are decomposed, or of several regions.
@@ -199,11 +151,8 @@ void collate(const fs::path& folder, int first, int last, const std::string& tar
       std::string part = bytes_of(entry.path());
       if (processor > first) part.erase(0, part.find('}') + 1);
       std::string& file = contents[fs::relative(entry.path(), from)];
-      if (file.empty())
-        file =
-            "/* a banner */\nFoamFile\n{\n    version 2.0;\n    format ascii;\n    class decomposedBlockData;\n}\n\n";
-      file +=
-          "// Processor" + std::to_string(processor) + "\n\n" + std::to_string(part.size()) + "\n(" + part + ")\n\n";
+      if (file.empty()) file = "/* a banner */\n" + OpenFoamCase::head("decomposedBlockData", "all") + "\n";
+      file += fmt::format("// Processor{}\n\n{}\n({})\n\n", processor, part.size(), part);
     }
     fs::remove_all(from);
   }
@@ -218,11 +167,8 @@ void expect_both_parts(const fs::path& folder, std::optional<int> step = {}) {
   const int at_end = step.value_or(1);
   vtkDataArray& U = *read->GetCellData()->GetArray("U");
   for (int cell = 0; cell < 2 * OpenFoamCase::cells; ++cell) {
-    double bounds[6];
-    read->GetCellBounds(cell, bounds);
-    const int part = bounds[0] < 1.5 ? 0 : 1, i = static_cast<int>(bounds[0]) - 2 * part, j = bounds[2] < 0.25 ? 0 : 1,
-              k = bounds[4] < 1 ? 0 : 1;
-    const int number = OpenFoamCase::cells * part + i + 2 * j + 4 * k;
+    const Vector3i at = middle_of(*read->GetCell(cell)).cwiseQuotient(Vector3d(1, 0.5, 2)).cast<int>();
+    const int number = OpenFoamCase::cells * (at.x() / 2) + at.x() % 2 + 2 * at.y() + 4 * at.z();
     EXPECT_EQ(U.GetComponent(cell, 1), OpenFoamCase::value(number, 1, at_end));
   }
   // The middle of the seam has the mean of all eight cells about it.
@@ -292,11 +238,9 @@ TEST(OpenFoamParts, RegionsKeepTheirOwnValuesWhereTheyMeet) {
   OpenFoamCase::write(folder / "solid", 1);
   fs::rename(folder / "fluid" / "system", folder / "system");
   for (const std::string region : {"fluid", "solid"}) {
-    fs::create_directories(folder / "constant" / region);
-    fs::rename(folder / region / "constant" / "polyMesh", folder / "constant" / region / "polyMesh");
-    for (const std::string time : {"0", "0.5"}) {
-      fs::create_directories(folder / time);
-      fs::rename(folder / region / time, folder / time / region);
+    for (const std::string place : {"constant", "0", "0.5"}) {
+      fs::create_directories(folder / place);
+      fs::rename(folder / region / place, folder / place / region);
     }
     fs::remove_all(folder / region);
   }

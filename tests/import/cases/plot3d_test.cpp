@@ -1,9 +1,11 @@
 #include <cstdint>
+#include <utility>
 
 #include <vtkDataArray.h>
 #include <vtkPointData.h>
 #include <vtkStructuredGrid.h>
 
+#include "base/text/byte_order.h"
 #include "tests/import/mesh_files.h"
 #include "tools/import/cases/case_files.h"
 
@@ -18,28 +20,22 @@ Form form_of(int bits) { return {bool(bits & 1), bool(bits & 2), bool(bits & 4),
 
 class Writer {
  public:
-  explicit Writer(const Form& form) : form_(form) {}
-  void integer(std::int32_t value) { put(&value, sizeof value, record_); }
+  explicit Writer(const Form& form) : form_(form), order_(form.big_endian ? ByteOrder::big : ByteOrder::little) {}
+  void integer(std::int32_t value) { append_number(value, order_, record_); }
   void real(double value) {
-    const auto single = static_cast<float>(value);
-    form_.doubles ? put(&value, sizeof value, record_) : put(&single, sizeof single, record_);
+    form_.doubles ? append_number(value, order_, record_) : append_number(static_cast<float>(value), order_, record_);
   }
   void end_record() {
     const auto length = static_cast<std::int32_t>(record_.size());
-    if (form_.marks) put(&length, 4, bytes_);
-    bytes_ += record_;
-    if (form_.marks) put(&length, 4, bytes_);
-    record_.clear();
+    if (form_.marks) append_number(length, order_, bytes_);
+    bytes_ += std::exchange(record_, "");
+    if (form_.marks) append_number(length, order_, bytes_);
   }
   const std::string& bytes() const { return bytes_; }
 
  private:
-  void put(const void* value, std::size_t size, std::string& to) {
-    std::string bytes(static_cast<const char*>(value), size);
-    if (form_.big_endian) std::reverse(bytes.begin(), bytes.end());  // the tests run on little-endian machines
-    to += bytes;
-  }
   Form form_;
+  ByteOrder order_;
   std::string bytes_, record_;
 };
 
@@ -50,7 +46,7 @@ double q_of(int i, int number) { return number == 0 ? 1 + 0.25 * (i % 7) : numbe
 
 void write_sizes(Writer& writer, const Form& form, const std::vector<int>& sizes) {
   if (form.count) {
-    writer.integer(1);
+    writer.integer(static_cast<int>(sizes.size() / 3));
     writer.end_record();
   }
   for (const int size : sizes) writer.integer(size);
@@ -60,12 +56,9 @@ void write_sizes(Writer& writer, const Form& form, const std::vector<int>& sizes
 std::string grid_bytes(const Form& form) {
   Writer writer(form);
   write_sizes(writer, form, {nx, ny, nz});
-  for (int axis = 0; axis < 3; ++axis) {
+  for (int axis = 0; axis < 3; ++axis)
     for (int i = 0; i < points; ++i) writer.real(x_of(i, axis));
-  }
-  if (form.blanking) {
-    for (int i = 0; i < points; ++i) writer.integer(i % 11 == 3 ? 0 : 1 - 2 * (i % 2));
-  }
+  for (int i = 0; form.blanking && i < points; ++i) writer.integer(i % 11 == 3 ? 0 : 1 - 2 * (i % 2));
   writer.end_record();
   return writer.bytes();
 }
@@ -75,9 +68,8 @@ std::string q_bytes(const Form& form, const std::vector<int>& sizes = {nx, ny, n
   write_sizes(writer, form, sizes);
   for (const double number : {0.8, 5.0, 1e6, 0.25}) writer.real(number);
   writer.end_record();
-  for (int number = 0; number < 5; ++number) {
+  for (int number = 0; number < 5; ++number)
     for (int i = 0; i < sizes[0] * sizes[1] * sizes[2]; ++i) writer.real(q_of(i, number));
-  }
   writer.end_record();
   return writer.bytes();
 }
@@ -129,8 +121,8 @@ TEST(Plot3dTest, PointsOfZeroDensityHaveNoVelocity) {
 TEST(Plot3dTest, FilesThatAreCutOffOrDoNotFitAreErrors) {
   const TemporaryFolder folder;
   const auto refuses = [&](const std::string& grid, const std::string& q, const std::string& name) {
-    const std::string error = error_in_child(folder / name, [&] { read_parts(folder, grid, q); });
-    EXPECT_THAT(error, HasSubstr(name + ": "));
+    SCOPED_TRACE(testing::PrintToString(grid.substr(0, 40)) + " and " + testing::PrintToString(q.substr(0, 40)));
+    EXPECT_THAT(error_in_child(folder / name, [&] { read_parts(folder, grid, q); }), HasSubstr(name + ": "));
   };
   for (int bits = 0; bits < 32; bits += 3) {
     const Form form = form_of(bits);
@@ -144,10 +136,8 @@ TEST(Plot3dTest, FilesThatAreCutOffOrDoNotFitAreErrors) {
   const std::string grid = grid_bytes({}), q = q_bytes({});
   Form marks;
   marks.marks = true;
-  refuses(grid, q_bytes({}, {nx, nz, ny}), "q.bin");
-  refuses(grid, q_bytes(marks), "q.bin");
-  refuses(grid, grid, "q.bin");
-  refuses(grid, "", "q.bin");
+  for (const std::string& other : {q_bytes({}, {nx, nz, ny}), q_bytes(marks), grid, std::string()})
+    refuses(grid, other, "q.bin");
   refuses("3 3 3\n0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0 0.0 0.5 1.0\n", q, "grid.bin");
   refuses(grid + std::string(5000, '\0'), q, "grid.bin");
   std::string endless = grid;
@@ -158,25 +148,21 @@ TEST(Plot3dTest, FilesThatAreCutOffOrDoNotFitAreErrors) {
     write_sizes(writer, {}, {size, size, size});
     refuses(writer.bytes(), q, "grid.bin");
   }
-  const std::string missing = error_of([&] { read_plot3d(folder / "grid.bin", folder / "none.bin"); });
-  EXPECT_NE(missing.find("none.bin: does not exist"), std::string::npos) << missing;
+  EXPECT_THAT(error_of([&] { read_plot3d(folder / "grid.bin", folder / "none.bin"); }),
+              HasSubstr("none.bin: does not exist"));
 }
 
 TEST(Plot3dTest, SeveralBlocksAreNamed) {
   const TemporaryFolder folder;
   Form form;
-  form.marks = true;
+  form.marks = form.count = true;
   Writer blocks(form);
-  blocks.integer(2);
-  blocks.end_record();
-  for (const int size : {2, 2, 2, 3, 2, 2}) blocks.integer(size);
-  blocks.end_record();
+  write_sizes(blocks, form, {2, 2, 2, 3, 2, 2});
   for (const int count : {8, 12}) {
     for (int i = 0; i < 3 * count; ++i) blocks.real(i);
     blocks.end_record();
   }
-  const std::string error = error_of([&] { read_parts(folder, blocks.bytes(), q_bytes(form)); });
-  EXPECT_NE(error.find("2 blocks"), std::string::npos) << error;
+  EXPECT_THAT(error_of([&] { read_parts(folder, blocks.bytes(), q_bytes(form)); }), HasSubstr("2 blocks"));
 }
 
 }  // namespace
