@@ -1,12 +1,10 @@
-
-#include "base/geometry/box.h"
-#include "renderer/meshes/mesh.h"
 #include "scenes/outputs/body_outline.h"
 #include "scenes/scene/scene.h"
 #include "tests/files.h"
 #include "tests/renderer/shapes.h"
 #include "tests/scenes/read_scene_fixture.h"
 #include "tests/scenes/small_scene.h"
+#include "tests/tracing/support.h"
 #include "volumes/files/tensor_files.h"
 
 namespace tensorray {
@@ -14,12 +12,11 @@ namespace {
 
 /// A field of 9³ voxels, and a surface that reaches `beyond` voxels further.
 TensorGrid grid_of_body(double beyond) {
-  TensorGrid grid =
-      dense_grid({Vector3i(0, 0, 0), Vector3i(8, 8, 8)}, Eigen::Affine3d::Identity(), [](const Vector3i& i) {
-        const Vector3d p = i.cast<double>() / 8;
-        return Eigen::Matrix3d(Vector3d(1 + p.x(), 2 - p.y(), p.z()).asDiagonal());
-      });
-  grid.surface = box_mesh({Vector3d::Constant(-beyond), Vector3d::Constant(8 + beyond)}, Eigen::Affine3d::Identity());
+  TensorGrid grid = dense_grid({Vector3i(0, 0, 0), Vector3i(8, 8, 8)}, Affine3d::Identity(), [](const Vector3i& i) {
+    const Vector3d p = i.cast<double>() / 8;
+    return Matrix3d(Vector3d(1 + p.x(), 2 - p.y(), p.z()).asDiagonal());
+  });
+  grid.surface = box_between(Vector3d::Constant(-beyond), Vector3d::Constant(8 + beyond));
   return grid;
 }
 
@@ -99,10 +96,6 @@ Plate outline_plate() {
   return plate;
 }
 
-TriangleMesh outline_box(const Vector3d& min, const Vector3d& max) {
-  return box_mesh({min, max}, Eigen::Affine3d::Identity());
-}
-
 /// The length of the strokes between two points that are visible, and of those that are hidden.
 Vector2d stroke_lengths(const std::vector<OutlineStroke>& strokes, const Vector2d& a, const Vector2d& b) {
   Vector2d sum(0, 0);
@@ -126,7 +119,7 @@ double outline_length(const std::vector<OutlineStroke>& strokes) {
 /// A box of 20 × 10 × 8 in light that falls by one unit along x and two along y for each unit of height. Its corner
 /// (x, y, z) is at the pixel (50 + x + z + 10, 50 − y − 2 (z + 10)).
 TEST(BodyOutlineTest, ABoxHasItsTwelveEdgesAtKnownPixels) {
-  const auto strokes = body_outline({outline_box({-10, -5, 0}, {10, 5, 8})}, outline_plate(), {1, 2, -1});
+  const auto strokes = body_outline({box_between({-10, -5, 0}, {10, 5, 8})}, outline_plate(), {1, 2, -1});
   const auto at = [](double x, double y, double z) { return Vector2d(50 + x + z + 10, 50 - y - 2 * (z + 10)); };
   // The viewer is above, and on the side of −x and −y.
   for (const double z : {0.0, 8.0})
@@ -148,7 +141,7 @@ TEST(BodyOutlineTest, ABoxHasItsTwelveEdgesAtKnownPixels) {
 /// on each other.
 TEST(BodyOutlineTest, ABodyHidesTheLinesBehindIt) {
   const auto strokes =
-      body_outline({outline_box({-30, -30, -10}, {30, 30, -5}), outline_box({-40, -10, 0}, {0, 10, 5})},
+      body_outline({box_between({-30, -30, -10}, {30, 30, -5}), box_between({-40, -10, 0}, {0, 10, 5})},
                    outline_plate(), {0, 0, -1});
   const Vector2d left = stroke_lengths(strokes, {20, 20}, {20, 80});  // Edges of the lower box.
   EXPECT_NEAR(left[0], 2 * 40, 2);
@@ -158,13 +151,7 @@ TEST(BodyOutlineTest, ABodyHidesTheLinesBehindIt) {
 
 /// Two boxes that touch, whose inner faces lie on each other: as one. Each has vertices of its own.
 TEST(BodyOutlineTest, ShellsThatTouchHaveNoLineBetweenThem) {
-  TriangleMesh both = outline_box({-20, -5, 0}, {0, 5, 8});
-  const TriangleMesh right = outline_box({0, -5, 0}, {20, 5, 8});
-  for (auto triangle : right.triangles) {
-    for (std::uint32_t& corner : triangle) corner += static_cast<std::uint32_t>(both.vertices.size());
-    both.triangles.push_back(triangle);
-  }
-  both.vertices.insert(both.vertices.end(), right.vertices.begin(), right.vertices.end());
+  const TriangleMesh both = joined({box_between({-20, -5, 0}, {0, 5, 8}), box_between({0, -5, 0}, {20, 5, 8})});
   const auto strokes = body_outline({both}, outline_plate(), {0, 0, -1});
   EXPECT_NEAR(stroke_lengths(strokes, {50, 45}, {50, 55})[0], 0, 1e-9);
   EXPECT_NEAR(stroke_lengths(strokes, {30, 45}, {30, 55})[0], 2 * 10, 1e-9);
