@@ -6,7 +6,7 @@
 
 #include "base/files/temporary_folder.h"
 #include "integrators/methods/read_scene.h"
-#include "tests/names.h"
+#include "tests/files.h"
 
 namespace tensorray::test {
 
@@ -16,7 +16,7 @@ using Files = std::map<std::string, std::filesystem::path>;
 inline const char* const smallest = R"({"field": {"file": "a.vdb"}, "integrator": {"type": "photon_distribution"}})";
 
 /// Makes a folder for each test, and removes it after the test.
-class ReadScene : public ::testing::Test {
+class ReadScene : public testing::Test {
  protected:
   std::filesystem::path file(const std::string& text) const {
     std::filesystem::path path = folder_ / "scene.json";
@@ -28,22 +28,17 @@ class ReadScene : public ::testing::Test {
     return read_scene(file(text), {overrides, {}});
   }
 
-  /// The message of the error, which must be one line; empty if nothing is thrown.
+  /// The message of the error, which must be one line.
   std::string error(const Overrides& overrides, const std::string& text = smallest) const {
-    try {
-      read(overrides, text);
-    } catch (const SceneError& error) {
-      EXPECT_THAT(error.what(), ::testing::Not(::testing::HasSubstr("\n")));
-      EXPECT_LT(std::string(error.what()).size(), 1000u);
-      return error.what();
-    }
-    ADD_FAILURE() << "no error: " << ::testing::PrintToString(overrides) << " on " << text.substr(0, 200);
-    return "";
+    EXPECT_THROW(read(overrides, text), SceneError) << testing::PrintToString(overrides) << text.substr(0, 200);
+    const std::string said = message([&] { read(overrides, text); });
+    EXPECT_LT(said.size(), 1000u);
+    return said;
   }
 
   /// Expects an error whose message has a part.
   void refuses(const std::string& part, const Overrides& overrides, const std::string& text = smallest) const {
-    EXPECT_THAT(error(overrides, text), ::testing::HasSubstr(part));
+    EXPECT_THAT(error(overrides, text), HasSubstr(part));
   }
 
   const TemporaryFolder temporary_;
