@@ -70,9 +70,7 @@ TEST_F(Paths, StylesColoursAndMaterialsAreDifferent) {
              5}}) {
     std::set<std::vector<float>> pictures;
     for (const std::string& value : each.values) {
-      Settings settings = each.more;
-      settings.push_back(each.key + "=" + value);
-      const Image image = render(settings, {"out.vtp"});
+      const Image image = render(joined(each.more, {each.key + "=" + value}), {"out.vtp"});
       EXPECT_GT(covered(image), 0) << value;
       EXPECT_GE(greatest(channel(image, "path")), 3) << value;
       EXPECT_GT(greatest(channel(image, "force")), 0) << value;
@@ -90,25 +88,22 @@ TEST_F(Paths, StylesColoursAndMaterialsAreDifferent) {
 TEST_F(Paths, SeedsOfEveryKind) {
   write("seeds.txt", "# Two points\n0 0 0\n0.3, 0.2, -0.5\n");
   for (const std::string kind : {"grid", "poisson_disk", "line", "sphere", "threshold", "file"}) {
-    std::vector<std::string> changes{"integrator.seeds.kind=" + kind, transparent, without_box};
+    Settings changes{"integrator.seeds.kind=" + kind, transparent, without_box};
     if (kind == "file") changes.emplace_back("integrator.seeds.file=seeds.txt");
     if (kind == "threshold") changes.emplace_back("integrator.seeds.above=0.5");
     const Image image = render(changes, {"out.tck"});
     EXPECT_GT(covered(image), 0) << kind;
-    const std::string tracks = read_file(in_folder("out.tck"));
-    EXPECT_NE(tracks.find(kind == "file" ? "count: 2\n" : "count: 16\n"), std::string::npos) << kind;
+    EXPECT_THAT(read_file(in_folder("out.tck")), HasSubstr(kind == "file" ? "count: 2\n" : "count: 16\n")) << kind;
   }
 }
 
 TEST_F(Paths, PathsOfAFileGiveTheSamePictureWithoutTracing) {
   // A given radius does not depend on the seeds, which a file of paths does not contain.
-  const Settings settings{"integrator.radius.typical=0.04"};
-  const Image traced = render(settings, {"out.vtp", "out.ply"});
+  const std::string radius = "integrator.radius.typical=0.04";
+  const Image traced = render({radius}, {"out.vtp", "out.ply"});
   const std::string tubes = read_file(in_folder("out.ply")), paths = read_file(in_folder("out.vtp"));
   std::filesystem::rename(in_folder("out.vtp"), in_folder("kept.vtp"));
-  Settings again = settings;
-  again.push_back("integrator.paths=kept.vtp");
-  EXPECT_TRUE(render(again, {"out.vtp", "out.ply"}).pixels == traced.pixels);
+  EXPECT_TRUE(render({radius, "integrator.paths=kept.vtp"}, {"out.vtp", "out.ply"}).pixels == traced.pixels);
   EXPECT_TRUE(read_file(in_folder("out.vtp")) == paths);
   EXPECT_TRUE(read_file(in_folder("out.ply")) == tubes);
 }
@@ -147,18 +142,12 @@ TEST_F(Paths, WhatAUserCanGetWrong) {
 }
 
 TEST_F(Paths, ContextIsShown) {
-  const Settings from_here{transparent, seen_from_the_side};
-  const auto with = [&](const std::string& setting) {
-    Settings settings = from_here;
-    settings.push_back(setting);
-    return render(settings);
-  };
-  const double plain = covered(render(from_here));
+  const auto with = [&](const std::string& setting) { return render({transparent, seen_from_the_side, setting}); };
+  const double plain = covered(render({transparent, seen_from_the_side}));
   EXPECT_LT(covered(with(without_box)), plain - 1);
   std::vector<Image> pictures;
-  for (const std::string& setting :
-       {std::string("integrator.context.plate=true"), std::string("integrator.context.slice={}"),
-        std::string(R"(integrator.context.isosurfaces=[{"invariant": "norm", "value": 1}])")}) {
+  for (const char* setting : {"integrator.context.plate=true", "integrator.context.slice={}",
+                              R"(integrator.context.isosurfaces=[{"invariant": "norm", "value": 1}])"}) {
     pictures.push_back(with(setting));
     const Image& image = pictures.back();
     EXPECT_GT(covered(image), plain + 4) << setting;
@@ -180,18 +169,15 @@ TEST_F(Paths, ContextIsShown) {
 }
 
 TEST_F(Paths, Backgrounds) {
-  const auto corner = [&](const std::vector<std::string>& settings) {
+  const auto corner = [&](const Settings& settings) -> Vector4f {
     const Image image = render(settings);
-    return Eigen::Vector4f(channel(image, "R")[0], channel(image, "G")[0], channel(image, "B")[0],
-                           channel(image, "A")[0]);
+    return {channel(image, "R")[0], channel(image, "G")[0], channel(image, "B")[0], channel(image, "A")[0]};
   };
-  EXPECT_LT((corner({}) - Eigen::Vector4f(1, 1, 1, 1)).norm(), 1e-4f);
-  EXPECT_LT((corner({"integrator.background_color=[0.2,0.2,0.2]"}) - Eigen::Vector4f(0.2f, 0.2f, 0.2f, 1)).norm(),
-            1e-4f);
-  EXPECT_EQ(corner({transparent}), Eigen::Vector4f(0, 0, 0, 0));
-  const Eigen::Vector4f sky =
-      corner({"integrator.background=lights", R"(lights=[{"kind": "constant", "strength": 0.3}])"});
-  EXPECT_LT((sky - Eigen::Vector4f(0.3f, 0.3f, 0.3f, 1)).norm(), 2e-3f);
+  EXPECT_LT((corner({}) - Vector4f(1, 1, 1, 1)).norm(), 1e-4f);
+  EXPECT_LT((corner({"integrator.background_color=[0.2,0.2,0.2]"}) - Vector4f(0.2f, 0.2f, 0.2f, 1)).norm(), 1e-4f);
+  EXPECT_EQ(corner({transparent}), Vector4f(0, 0, 0, 0));
+  const Vector4f sky = corner({"integrator.background=lights", R"(lights=[{"kind": "constant", "strength": 0.3}])"});
+  EXPECT_LT((sky - Vector4f(0.3f, 0.3f, 0.3f, 1)).norm(), 2e-3f);
 }
 
 TEST_F(Paths, PreviewsNeedNoLights) {

@@ -2,6 +2,7 @@
 /// Renders small scenes as `tensorray render` does, in the process of the test.
 
 #include <fstream>
+#include <numeric>
 #include <optional>
 #include <regex>
 #include <stdexcept>
@@ -27,6 +28,11 @@ namespace tensorray::test {
 
 using Settings = std::vector<std::string>;
 
+inline Settings joined(Settings first, const Settings& more) {
+  first.insert(first.end(), more.begin(), more.end());
+  return first;
+}
+
 inline std::string read_file(const std::filesystem::path& path) { return bytes_of(path); }
 
 /// The named channel of a picture, by pixel.
@@ -43,11 +49,7 @@ inline std::vector<float> channel(const Image& image, const std::string& name) {
   return values;
 }
 
-inline double sum(const std::vector<float>& values) {
-  double total = 0;
-  for (const float value : values) total += static_cast<double>(value);
-  return total;
-}
+inline double sum(const std::vector<float>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
 inline double mean(const Image& image, const std::string& name) {
   return sum(channel(image, name)) / image.width / image.height;

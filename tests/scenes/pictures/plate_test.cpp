@@ -80,11 +80,8 @@ TEST_F(PlatePicture, OddFieldsAreRendered) {
 TEST_F(PlatePicture, RgbModeIsThePapers) {
   EXPECT_EQ(render({"bending.rgb=[0.1,0.2,0.3]"}).channels.size(), 3u);
   const Image grey = render({"bending.rgb=[0.2,0.2,0.2]"});  // Equal flexibilities give no colour at all.
-  for (int i = 0; i < 32 * 32; ++i) {
-    const float* rgb = grey.pixel(i % 32, i / 32);
-    ASSERT_NEAR(rgb[0], rgb[1], 1e-5);
-    ASSERT_NEAR(rgb[0], rgb[2], 1e-5);
-  }
+  for (const char* other : {"G", "B"})
+    EXPECT_THAT(channel(grey, other), testing::Pointwise(testing::FloatNear(1e-5f), channel(grey, "R"))) << other;
 }
 
 TEST_F(PlatePicture, OddLightIsWarnedOf) {
@@ -110,16 +107,11 @@ TEST_F(PlatePicture, OddLightIsWarnedOf) {
 
 TEST_F(PlatePicture, IsSeenAlongTheLightAnywhere) {
   remove_field();
-  const auto column_of_light = [&](Settings receiver) {
-    receiver.push_back(R"(light.aperture={"center":[0.5,0,0],"size":[0.5,0.5]})");
-    const Image image = render(receiver);
-    double sum = 0, moment = 0;
-    for (int y = 0; y < 32; ++y)
-      for (int x = 0; x < 32; ++x) {
-        sum += image.pixel(x, y)[1];
-        moment += image.pixel(x, y)[1] * (x + 0.5);
-      }
-    return moment / sum;
+  const auto column_of_light = [&](const Settings& receiver) {
+    const Image image = render(joined(receiver, {R"(light.aperture={"center":[0.5,0,0],"size":[0.5,0.5]})"}));
+    double moment = 0;
+    for (int i = 0; i < 32 * 32; ++i) moment += image.pixel(i % 32, i / 32)[1] * (i % 32 + 0.5);
+    return moment / sum(channel(image, "G"));
   };
   const std::string size = "receiver.size=[2,2]";
   EXPECT_NEAR(column_of_light({size}), 24, 0.2);
@@ -140,9 +132,8 @@ TEST_F(PlatePicture, BalancesWithEveryMethodAndEnd) {
                                     {"integrator.density.kind=gaussian", "integrator.side_light=false"},
                                     {"integrator.density.kind=histogram", "bending.max_steps=20"},
                                     {"integrator.type=lens"}};
-  for (Settings settings : cases) {
-    settings.push_back("field.scale=20");
-    render(settings);
+  for (const Settings& settings : cases) {
+    render(joined(settings, {"field.scale=20"}));
     const double emitted = statistics_["photons"]["emitted"].get<double>();
     EXPECT_GT(emitted, 0) << settings[0];
     EXPECT_EQ(sum_of_ends(statistics_["photons"]), emitted) << settings[0];
@@ -198,28 +189,26 @@ TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
 /// The magnification is that of the displacement, from pixel to pixel.
 TEST_F(MeshLight, TheMapsChannelsDescribeOneMap) {
   const Image image = render({});
-  const auto index = [&](const std::string& name) {
-    return std::find(image.channels.begin(), image.channels.end(), name) - image.channels.begin();
+  const auto at = [&](const char* name, int x, int y) {
+    return image.pixel(x, y)[std::find(image.channels.begin(), image.channels.end(), name) - image.channels.begin()];
   };
-  const auto dx = index("displacement.x"), dy = index("displacement.y"), log = index("magnification.log"),
-             major = index("magnification.major"), minor = index("magnification.minor"), folds = index("folds");
+  const auto displacement = [&](int x, int y) {
+    return Vector2d(at("displacement.x", x, y), at("displacement.y", x, y));
+  };
   const double pixel = 2.6 / 96;
   int compared = 0;
   for (int y = 1; y < 95; ++y)
     for (int x = 1; x < 95; ++x) {
-      const float* const here = image.pixel(x, y);
-      EXPECT_NEAR(here[log], here[major] + here[minor], 1e-4);
-      EXPECT_GE(here[major] + 1e-6, here[minor]);
-      if (std::hypot(x - 47.5, y - 47.5) > 25 || here[folds] != 1) continue;  // Within the bright disc.
+      const double log = at("magnification.log", x, y), major = at("magnification.major", x, y),
+                   minor = at("magnification.minor", x, y);
+      EXPECT_NEAR(log, major + minor, 1e-4);
+      EXPECT_GE(major + 1e-6, minor);
+      if (std::hypot(x - 47.5, y - 47.5) > 25 || at("folds", x, y) != 1) continue;  // Within the bright disc.
       // By the position across the beam where the light of neighbouring pixels starts; y of the plate is along −y.
-      const auto slope = [&](const float* after, const float* before, int axis) {
-        return (axis == 0 ? after[dx] - before[dx] : after[dy] - before[dy]) / (2 * pixel);
-      };
-      const float *right = image.pixel(x + 1, y), *left = image.pixel(x - 1, y), *above = image.pixel(x, y - 1),
-                  *below = image.pixel(x, y + 1);
-      const double a = 1 - slope(right, left, 0), b = -slope(above, below, 0), c = -slope(right, left, 1),
-                   d = 1 - slope(above, below, 1);
-      EXPECT_NEAR(-std::log(std::abs(a * d - b * c)), here[log], 0.15) << x << " " << y;
+      Matrix2d slopes;
+      slopes << displacement(x + 1, y) - displacement(x - 1, y), displacement(x, y - 1) - displacement(x, y + 1);
+      const double starts = (Matrix2d::Identity() - slopes / (2 * pixel)).determinant();
+      EXPECT_NEAR(-std::log(std::abs(starts)), log, 0.15) << x << " " << y;
       ++compared;
     }
   EXPECT_GT(compared, 1000);
@@ -242,10 +231,8 @@ TEST_F(MeshLight, SettingsWithoutEffectAndErrorsThatCannotBeReachedAreTold) {
        "`/integrator/density/error` has no effect: it belongs to the density \"mesh\""},
       {{"integrator.density.error=0.001"}, "raise `light.photons`"}};
   for (const auto& [settings, warning] : cases) {
-    Settings few = settings;
-    few.push_back("light.photons=2000");
-    render(few);
-    EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr(warning)));
+    render(joined(settings, {"light.photons=2000"}));
+    EXPECT_THAT(notes_, Contains(HasSubstr(warning)));
   }
 }
 
@@ -277,26 +264,19 @@ Render light_of(const std::string& density, double s, const Json& side_light) {
 
 /// Power by end, as a part of what is emitted.
 double share(const Render& render, RayEnd which) {
-  double power = 0, all = 0, emitted = render.statistics.beam_power;
-  for (std::size_t channel = 0; channel < render.statistics.ends.size(); ++channel)
+  const Statistics& found = render.statistics;
+  const bool of_rays = found.power.empty();
+  double power = 0, all = 0, emitted = found.beam_power;
+  for (std::size_t channel = 0; channel < found.ends.size(); ++channel) {
     for (int end = 0; end < ray_end_count; ++end) {
-      const double each = render.statistics.power.empty() ? static_cast<double>(render.statistics.ends[channel][end])
-                                                          : render.statistics.power[channel][end];
+      const double each = of_rays ? static_cast<double>(found.ends[channel][end]) : found.power[channel][end];
       all += each;
       if (end == static_cast<int>(which)) power += each;
     }
-  for (const std::uint64_t count : render.statistics.emitted)
-    emitted += render.statistics.power.empty() ? static_cast<double>(count) : 0;
+    if (of_rays) emitted += static_cast<double>(found.emitted[channel]);
+  }
   EXPECT_NEAR(all / emitted, 1, 1e-6);
   return power / emitted;
-}
-
-/// The sum of the red of all pixels. Other channels of the picture are not light.
-double red_of(const Render& render) {
-  double sum = 0;
-  for (std::size_t i = 0; i < render.linear.pixels.size(); i += render.linear.channels.size())
-    sum += render.linear.pixels[i];
-  return sum;
 }
 
 /// In this field V = (sin θ, 0, −cos θ) turns by θ' = −s cos 2θ. All light is displaced alike, by x on its way from
@@ -318,7 +298,7 @@ TEST(SideLight, IsLeftOutAndCounted) {
     EXPECT_NEAR(share(with, RayEnd::plate), 1, 1e-3) << density;
     EXPECT_NEAR(share(without, RayEnd::plate), 1 - side, 1e-3) << density;
     // The volume is 64 pixels wide; the mesh knows the edge of the light that is left to one of them.
-    EXPECT_NEAR(red_of(without) / red_of(with), 1 - side, 1.0 / 64) << density;
+    EXPECT_NEAR(mean(without.linear, "R") / mean(with.linear, "R"), 1 - side, 1.0 / 64) << density;
     ASSERT_EQ(without.notes.size(), 1u) << density;
     EXPECT_THAT(without.notes[0], HasSubstr("side faces")) << density;
     EXPECT_EQ(light_of(density, s, {}).linear.pixels, with.linear.pixels) << density;
@@ -336,7 +316,7 @@ TEST(UndisturbedLight, IsOneOnAllOfThePlate) {
                                                     {{{"size", {2, 2}}, {"center", {2, 1, -4}}}, 1},
                                                     {{{"size", {5, 5}}, {"normal", {1, 0, 1}}}, std::sqrt(0.5)}};
   for (const std::string density : {"mesh", "gaussian", "histogram"})
-    for (const auto& direction : std::vector<Eigen::Vector3d>{{0, 0, -1}, {0.3, 0.1, -1}, {1, 1, -1.5}})
+    for (const auto& direction : std::vector<Vector3d>{{0, 0, -1}, {0.3, 0.1, -1}, {1, 1, -1.5}})
       for (const auto& [plate, cosine] : plates) {
         if (plate.contains("normal") && direction.x() != 0) continue;
         if (density != "mesh" && direction.x() == 1) continue;
@@ -346,20 +326,12 @@ TEST(UndisturbedLight, IsOneOnAllOfThePlate) {
         json["receiver"]["resolution"] = {48, 48};
         const Render render = light_of(json);
         const std::string what = density + json.dump();
-        float least = 2, most = 0;  // Of R, G and B.
-        double mean = 0;
-        for (int i = 0; i < 3 * 48 * 48; ++i) {
-          const float value = render.linear.pixel(i / 3 % 48, i / 144)[i % 3];
-          least = std::min(least, value);
-          most = std::max(most, value);
-          mean += value / (3 * 48 * 48);
-        }
-        EXPECT_NEAR(mean, cosine, 0.02) << what;
+        for (const char* color : {"R", "G", "B"}) EXPECT_NEAR(mean(render.linear, color), cosine, 0.02) << what;
         // Rays start 3e-6 of the volume's light inside of its edge, which is up to 500 pixels long. Of photons, few are
         // in a pixel.
         if (density != "mesh") continue;
-        EXPECT_NEAR(least, cosine, 2e-3) << what;
-        EXPECT_NEAR(most, cosine, 2e-3) << what;
+        const auto is_undisturbed = testing::Each(testing::FloatNear(static_cast<float>(cosine), 2e-3f));
+        for (const char* color : {"R", "G", "B"}) EXPECT_THAT(channel(render.linear, color), is_undisturbed) << what;
         EXPECT_EQ(share(render, RayEnd::side), 0) << what;
       }
 }
@@ -390,15 +362,10 @@ TEST(UndisturbedLight, IsBesideLightThatIsDisplaced) {
     EXPECT_NEAR(at(1 - x, 1), 0, error) << density;
     EXPECT_NEAR(at(1, 4), 1, error) << density;
     // All light that is emitted, but for that of the sides, lands or misses the plate.
-    const double emitted =
-        light.statistics.power.empty() ? 0 : light.statistics.beam_power * share(light, RayEnd::side);
     if (density == "mesh") {
-      EXPECT_NEAR(emitted, 3 * 2 * x / 3, 0.05);
+      EXPECT_NEAR(light.statistics.beam_power * share(light, RayEnd::side), 2 * x, 0.05);
     }
-    double landed = 0;
-    for (int y = 0; y < 256; ++y)
-      for (int column = 0; column < 256; ++column) landed += light.linear.pixel(column, y)[1] * pixel * pixel;
-    EXPECT_NEAR(landed, 64 - 2 * x, 0.1) << density;
+    EXPECT_NEAR(64 * mean(light.linear, "G"), 64 - 2 * x, 0.1) << density;
   }
 }
 
