@@ -20,7 +20,7 @@ class ExampleScene : public Pictures, public ::testing::WithParamInterface<std::
   /// Renders the scene, whose light bends.
   Image picture(const Settings& settings) {
     const Image image = render_all(settings, {}, 0, GetParam()).linear;
-    const std::string text = read_file(GetParam());
+    const std::string text = bytes_of(GetParam());
     if (text.find("\"scale\"") == std::string::npos && text.find("\"polariscope\"") == std::string::npos) {
       EXPECT_THAT(notes_, Contains(HasSubstr("the median ray turns by")));
     }

@@ -7,14 +7,6 @@
 namespace tensorray {
 namespace {
 
-/// A picture of random colours whose display values have 8 bits.
-Image random_picture(int width, int height) {
-  Image image(width, height, {"R", "G", "B"});
-  for (std::size_t i = 0; i < image.pixels.size(); ++i)
-    image.pixels[i] = static_cast<float>(std::floor(256 * random_uniform(1, i, 0)) / 255);
-  return image;
-}
-
 /// A lens scene that renders quickly; `rest` contains further keys of the integrator.
 std::string small_lens(const std::string& rest, const std::string& kind = R"("kind": "point_load", "resolution": 17)") {
   return R"({"field": {"generate": {)" + kind + R"(}},
@@ -30,7 +22,9 @@ constexpr const char* no_bending =
 using Lens = Pictures;
 
 TEST_F(Lens, WithoutAFieldThePictureIsTheImage) {
-  const Image picture = random_picture(48, 32);
+  Image picture(48, 32, {"R", "G", "B"});  // Random colours whose display values have 8 bits.
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i)
+    picture.pixels[i] = static_cast<float>(std::floor(256 * random_uniform(1, i, 0)) / 255);
   write_image(in_folder("photo.png"), picture);
   write("scene.json", small_lens(R"("image": "photo.png")", no_bending));
   for (const std::string settings : {"integrator.mode=gather", "integrator.mode=scatter", "bending.rgb=[0.1,0.2,0.3]",

@@ -23,17 +23,19 @@ class Polariscope : public Pictures {
  protected:
   void SetUp() override { write("scene.json", plate_scene); }
 
-  /// The coefficient with which the plate has a retardance.
+  /// The coefficient with which the plate has a retardance, and its key.
   double coefficient(double nanometres) { return nanometres * 1e-9 / (8e6 * channel(render({}), "length")[0]); }
+  std::string retarding(double nanometres) {
+    return fmt::format("integrator.stress_optic={}", coefficient(nanometres));
+  }
 };
 
 /// The interference-colour chart: XYZ of sin² times the illuminant, 1 nm at a time.
 TEST_F(Polariscope, ColoursAreThoseOfTheInterferenceChart) {
   const Spectrum light = illuminant("D65");
   for (const double retardance : {250.0, 551.0, 1100.0, 1700.0}) {
-    const Image image =
-        render({fmt::format("integrator.stress_optic={}", coefficient(retardance)), "output.white_balance=false",
-                "light.wavelengths.count=400", "integrator.arrangement=plane"});
+    const Image image = render({retarding(retardance), "output.white_balance=false", "light.wavelengths.count=400",
+                                "integrator.arrangement=plane"});
     Vector3d xyz = Vector3d::Zero();
     double white = 0;
     for (double wavelength = 380.5; wavelength < 780; ++wavelength) {
@@ -51,15 +53,14 @@ TEST_F(Polariscope, ChannelsAreRetardanceAndDirections) {
   // 0.3 and 1.7 orders of 545 nm, the middle of the band nearest to 550 nm: the principal value is below half an order,
   // and then the slow axis is the other one.
   for (const auto& [orders, wrapped, azimuth] : {std::tuple(0.3, 0.3, 0.0), std::tuple(1.7, 0.3, pi / 2)}) {
-    const Image image = render({fmt::format("integrator.stress_optic={}", coefficient(545 * orders))});
+    const Image image = render({retarding(545 * orders)});
     EXPECT_NEAR(channel(image, "integral")[0], orders * 545, 0.01);
     EXPECT_NEAR(channel(image, "retardance")[0], wrapped * 545, 0.01);
     EXPECT_NEAR(std::abs(channel(image, "azimuth")[0]), azimuth, 1e-4);
     EXPECT_NEAR(std::abs(channel(image, "rotation")[0]), 0, 1e-4);
   }
   // A negative coefficient: the slow axis is across the stress.
-  const Image image = render({fmt::format("integrator.stress_optic={}", coefficient(-0.3 * 545))});
-  EXPECT_NEAR(std::abs(channel(image, "azimuth")[0]), pi / 2, 1e-4);
+  EXPECT_NEAR(std::abs(channel(render({retarding(-0.3 * 545)}), "azimuth")[0]), pi / 2, 1e-4);
 }
 
 TEST_F(Polariscope, UnitsOfLengthAndOfStressCancel) {
