@@ -57,9 +57,7 @@ Rendered rendered(const MethodCase& method, const Json& annotations) {
   json["light"] = {{"photons", 2000}, {"wavelengths", {{"count", 4}}}};
   json["receiver"] = {{"size", {2.5, 2.5}}, {"resolution", {size, size}}};
   json["camera"]["resolution"] = {size, size};
-  for (const auto& [key, value] : {std::pair("max_samples", 1), {"min_samples", 1}, {"bands", 8}})
-    json["integrator"][key] = value;
-  json["integrator"]["seeds"] = {{"count", 20}};
+  json["integrator"].update({{"max_samples", 1}, {"min_samples", 1}, {"bands", 8}, {"seeds", {{"count", 20}}}});
   if (!annotations.is_null()) json["output"] = {{"annotations", annotations}};
   Scene scene = loaded(json);
   Render render = tensorray::render(scene, Progress());

@@ -1,19 +1,53 @@
 #include "integrators/methods/read_scene.h"
 
+#include <map>
+
 #include <sys/stat.h>
 
+#include "base/files/temporary_folder.h"
 #include "integrators/lens/lens_method.h"
 #include "integrators/path_tracing/path_tracing_method.h"
 #include "integrators/photon_distribution/photon_distribution_method.h"
 #include "scenes/description/check_scene.h"
 #include "tests/files.h"
-#include "tests/scenes/read_scene_fixture.h"
 
 namespace tensorray {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace test;
+using Overrides = std::vector<std::string>;
+using Files = std::map<std::string, fs::path>;
+
+const char* const smallest = R"({"field": {"file": "a.vdb"}, "integrator": {"type": "photon_distribution"}})";
+
+/// Makes a folder for each test, and removes it after the test.
+class ReadScene : public testing::Test {
+ protected:
+  fs::path file(const std::string& text) const {
+    write_bytes(folder_ / "scene.json", text);
+    return folder_ / "scene.json";
+  }
+
+  SceneDescription read(const Overrides& overrides = {}, const std::string& text = smallest) const {
+    return read_scene(file(text), {overrides, {}});
+  }
+
+  /// The message of the error, which must be one line.
+  std::string error(const Overrides& overrides, const std::string& text = smallest) const {
+    EXPECT_THROW(read(overrides, text), SceneError) << testing::PrintToString(overrides) << text.substr(0, 200);
+    const std::string said = message([&] { read(overrides, text); });
+    EXPECT_LT(said.size(), 1000u);
+    return said;
+  }
+
+  /// Expects an error whose message has a part.
+  void refuses(const std::string& part, const Overrides& overrides, const std::string& text = smallest) const {
+    EXPECT_THAT(error(overrides, text), HasSubstr(part));
+  }
+
+  const TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_ / "";
+};
 
 TEST_F(ReadScene, ReadsEveryKindOfValue) {
   const SceneDescription scene = read({}, R"({
@@ -56,15 +90,6 @@ TEST_F(ReadScene, ReadsEveryKindOfValue) {
   EXPECT_FALSE(scene.output.white_balance);
 }
 
-TEST_F(ReadScene, WrongLensesAreRefused) {
-  refuses("\"checkerboard\", \"grid\", \"color_wheel\"", {"integrator.image=chekerboard"});
-  refuses("a number, or a list of them", {"integrator.image_plane.depth=[]"});
-  refuses("a number, or a list of them", {"integrator.image_plane.depth=[0,\"a\"]"});
-  refuses("/integrator/image_plane", {"integrator.image_plane.depth=0", "integrator.image_plane.distance=1"});
-  refuses("is perpendicular to the light", {"integrator.image_plane.normal=[1,0,0]"});
-  refuses("an integer from 1 to 16", {"integrator.samples=0"});
-}
-
 TEST_F(ReadScene, WordsStandForNoValue) {
   const SceneDescription scene = read({"field.scale=auto", "bending.step=auto", "output.exposure=auto",
                                        "light.wavelengths.per_photon=all", "receiver.resolution=100"});
@@ -85,18 +110,14 @@ TEST_F(ReadScene, Generates) {
   EXPECT_EQ(constant.tensor(2, 0), 7);
   EXPECT_EQ(scene.field.generate->grid.resolution, Vector3i(4, 5, 6));
   EXPECT_EQ(scene.field.generate->grid.max, Vector3d(1, 2, 3));
-}
-
-TEST_F(ReadScene, OneResolutionMakesCubes) {
-  const Overrides generate{"field.file=null", "field.generate.kind=helix", "field.generate.resolution=17"};
-  const GridSettings standard = read(generate).field.generate->grid;
-  const GridSettings expected = default_grid(Helix{}, 17);
+  // One resolution makes cubes.
+  const auto grid_of = [this](const std::string& generate) {
+    return read({"field.file=null", "field.generate={" + generate + "}"}).field.generate->grid;
+  };
+  const GridSettings standard = grid_of(R"("kind":"helix","resolution":17)"), expected = default_grid(Helix{}, 17);
   EXPECT_EQ(standard.resolution, expected.resolution);
   EXPECT_EQ(standard.max, expected.max);
-
-  const Overrides box{generate[0], generate[1], generate[2], "field.generate.min=[0,0,0]",
-                      "field.generate.max=[1,2,4]"};
-  EXPECT_EQ(read(box).field.generate->grid.resolution, Vector3i(5, 9, 17));
+  EXPECT_EQ(grid_of(R"("kind":"helix","resolution":17,"min":[0,0,0],"max":[1,2,4])").resolution, Vector3i(5, 9, 17));
 }
 
 TEST_F(ReadScene, OverridesChangeAddAndRemove) {
@@ -162,6 +183,13 @@ TEST_F(ReadScene, WrongTypesSayWhatIsExpectedAndFound) {
   refuses("must be a number other than 0, or \"auto\", but is \"x\"", {"field.scale=x"});
   refuses("a list of 3 numbers", {"light.direction=[0,1]"});
   refuses("a list of 3 numbers", {"light.direction=[0,1,null]"});
+  // Of lenses.
+  refuses("\"checkerboard\", \"grid\", \"color_wheel\"", {"integrator.image=chekerboard"});
+  refuses("a number, or a list of them", {"integrator.image_plane.depth=[]"});
+  refuses("a number, or a list of them", {"integrator.image_plane.depth=[0,\"a\"]"});
+  refuses("/integrator/image_plane", {"integrator.image_plane.depth=0", "integrator.image_plane.distance=1"});
+  refuses("is perpendicular to the light", {"integrator.image_plane.normal=[1,0,0]"});
+  refuses("an integer from 1 to 16", {"integrator.samples=0"});
 }
 
 /// What no bound of the schema refuses; schema_test.cpp has the others.
@@ -206,9 +234,9 @@ TEST_F(ReadScene, KeysThatAreMissingOrExcludeEachOther) {
 }
 
 TEST_F(ReadScene, ChecksAcrossKeys) {
-  refuses("`/light/wavelengths/min` (600 nm)", {"light.wavelengths={\"min\":600,\"max\":500}"});
-  refuses("`/light/wavelengths/count` must be 1", {"light.wavelengths={\"min\":600,\"max\":600}"});
-  EXPECT_EQ(read({"light.wavelengths={\"min\":600,\"max\":600,\"count\":1}"}).light.wavelength_count, 1);
+  refuses("`/light/wavelengths/min` (600 nm)", {R"(light.wavelengths={"min":600,"max":500})"});
+  refuses("`/light/wavelengths/count` must be 1", {R"(light.wavelengths={"min":600,"max":600})"});
+  EXPECT_EQ(read({R"(light.wavelengths={"min":600,"max":600,"count":1})"}).light.wavelength_count, 1);
   refuses("must divide `count` (32), but is 5", {"light.wavelengths.per_photon=5"});
   refuses("must divide", {"light.wavelengths.per_photon=64"});
   EXPECT_EQ(read({"light.wavelengths.per_photon=8"}).light.wavelengths_per_photon, 8);
@@ -218,8 +246,8 @@ TEST_F(ReadScene, ChecksAcrossKeys) {
 }
 
 TEST_F(ReadScene, Spectra) {
-  for (const char* name : {"D65", "E", "A"})
-    EXPECT_EQ(std::get<Illuminant>(read({std::string("light.spectrum=") + name}).light.spectrum).name, name);
+  for (const std::string name : {"D65", "E", "A"})
+    EXPECT_EQ(std::get<Illuminant>(read({"light.spectrum=" + name}).light.spectrum).name, name);
   EXPECT_EQ(std::get<BlackBody>(read({"light.spectrum=blackbody 5500"}).light.spectrum).kelvin, 5500);
   EXPECT_EQ(std::get<BlackBody>(read({"light.spectrum=blackbody  2856.5 "}).light.spectrum).kelvin, 2856.5);
   const auto file_of = [this](const std::string& text) {
@@ -228,9 +256,9 @@ TEST_F(ReadScene, Spectra) {
   EXPECT_EQ(file_of("blackbody.txt"), folder_ / "blackbody.txt");
   EXPECT_EQ(file_of("/lamps/led"), "/lamps/led");
   refuses("`/light/spectrum` must be one of \"D65\"", {"light.spectrum=d65"});
-  for (const char* wrong : {"blackbody", "blackbody -1", "blackbody 0", "blackbody hot", "blackbody 5000 K",
-                            "blackbody 0x1p12", "blackbody nan", "blackbody inf", "blackbody 1e300"}) {
-    EXPECT_THAT(error({std::string("light.spectrum=") + wrong}), HasSubstr("blackbody KELVIN")) << wrong;
+  for (const std::string wrong : {"", " -1", " 0", " hot", " 5000 K", " 0x1p12", " nan", " inf", " 1e300"}) {
+    SCOPED_TRACE(wrong);
+    refuses("blackbody KELVIN", {"light.spectrum=blackbody" + wrong});
   }
 }
 
@@ -307,18 +335,15 @@ TEST_F(ReadScene, OutputsOfTheCommandLineTakeThePlaceOfTheScenes) {
 TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
   for (const char* name :
        {"body.ply", "cut.ply", "photo.png", "sky.exr", "lamp.txt", "config.ocio", "seeds.txt", "optic.txt"})
-    std::ofstream(folder_ / name) << name;
+    write_bytes(folder_ / name, name);
   fs::create_directories(folder_ / "folder");
-  const Overrides inputs{"obstacles=[{\"file\":\"body.ply\"}]",
-                         "field.bounds=cut.ply",
-                         "integrator.image=photo.png",
-                         "lights=[{\"kind\":\"environment\",\"file\":\"sky.exr\"}]",
-                         "light.spectrum=lamp.txt",
-                         "output.ocio=config.ocio",
-                         "integrator.seeds={\"kind\":\"file\",\"file\":\"seeds.txt\"}",
-                         "integrator.stress_optic=optic.txt"};
   unsetenv("OCIO");
-  const SceneDescription scene = read(inputs);
+  const SceneDescription scene = read({}, R"({
+    "field": {"file": "a.vdb", "bounds": "cut.ply"}, "obstacles": [{"file": "body.ply"}],
+    "light": {"spectrum": "lamp.txt"}, "lights": [{"kind": "environment", "file": "sky.exr"}],
+    "integrator": {"type": "photon_distribution", "image": "photo.png", "stress_optic": "optic.txt",
+                   "seeds": {"kind": "file", "file": "seeds.txt"}},
+    "output": {"ocio": "config.ocio"}})");
   for (const NamedFile& input : input_files(scene)) {
     if (!fs::exists(input.path)) continue;
     const fs::path hard = folder_ / "hard_link", soft = folder_ / "soft_link";
