@@ -22,31 +22,31 @@ FieldViewSettings view(Conserve conserve, double flexibility) {
   return settings;
 }
 
+BentRay ray_of(const Vector3d& position, const Vector3d& direction) {
+  BentRay ray;
+  ray.position = position;
+  ray.direction = direction;
+  return ray;
+}
+
 /// A ray that enters the cube [−1, 1]³: positions are uniform on its surface, directions have the density cos θ / π.
-void sample_entry(std::uint64_t index, Vector3d& position, Vector3d& direction) {
+BentRay sample_entry(std::uint64_t index) {
   PathSampler sampler{5, index, 0, 0};
   const int face = static_cast<int>(6 * sampler.next_1d());
   const Eigen::Vector2d at = 2 * sampler.next_2d() - Eigen::Vector2d(1, 1);
   const double side = face % 2 == 0 ? 1 : -1;
   const int axis = face / 2;
+  Vector3d position;
   position[axis] = side;
   position[(axis + 1) % 3] = at.x();
   position[(axis + 2) % 3] = at.y();
-  direction = frame_about(-side * Vector3d::Unit(axis)) * square_to_cosine_hemisphere(sampler.next_2d());
+  return ray_of(position, frame_about(-side * Vector3d::Unit(axis)) * square_to_cosine_hemisphere(sampler.next_2d()));
 }
 
 Geometry geometry_among(const TensorField& field, std::vector<TriangleMesh> obstacles) {
   Surfaces surfaces = surfaces_of(field);
   surfaces.obstacles = std::move(obstacles);
   return Geometry(std::move(surfaces));
-}
-
-BentRay follow(const FieldRegion& region, const Vector3d& position, const Vector3d& direction) {
-  std::vector<BentRay> ways(1);
-  ways[0].position = position;
-  ways[0].direction = direction;
-  region.trace_radiance(ways);
-  return ways[0];
 }
 
 /// Mean and standard error.
@@ -81,17 +81,20 @@ TEST(FieldRegionTest, WaysStartOnSurfaces) {
     const Geometry geometry = geometry_among(field, {floor, roof});
     const FieldRegion region(field, geometry, view(Conserve::power, 1e-9));
     const SurfaceScene stage({surface_of(floor)});
+    std::vector<BentRay> ways;
     for (std::uint64_t i = 0; i < 200; ++i) {
       PathSampler sampler{7, i, 0, 0};
       const Vector2d at = 1.6 * sampler.next_2d() - Vector2d(0.8, 0.8);
       const Vector3d direction = square_to_cosine_hemisphere(sampler.next_2d());
       const auto hit = stage.intersect({at.x(), at.y(), 0}, {0, 0, -1});
       const Vector3d start = stage.start(*hit, hit->lifted_position, 1);
-      if (std::isinf(region.entry(start, direction))) continue;
-      const BentRay way = follow(region, start, direction);
+      if (!std::isinf(region.entry(start, direction))) ways.push_back(ray_of(start, direction));
+    }
+    region.trace_radiance(ways);
+    for (const BentRay& way : ways) {
       ASSERT_TRUE(way.arrives);
-      EXPECT_GT(way.position.z(), height + 1e-3) << i;
-      EXPECT_TRUE(!way.on_surface || std::abs(way.position.z() - 0.4) < 1e-5) << i;
+      EXPECT_GT(way.position.z(), height + 1e-3);
+      EXPECT_TRUE(!way.on_surface || std::abs(way.position.z() - 0.4) < 1e-5);
     }
   }
 }
@@ -101,8 +104,8 @@ TEST(FieldRegionTest, TheMeanGainOverAConvexBoundaryIsOne) {
   const TensorField field = cube_field(17, linear_tensor);
   const Geometry geometry(surfaces_of(field));
   const FieldRegion region(field, geometry, view(Conserve::power, 0.5));
-  std::vector<BentRay> ways(60000);
-  for (std::size_t i = 0; i < ways.size(); ++i) sample_entry(i, ways[i].position, ways[i].direction);
+  std::vector<BentRay> ways;
+  for (std::uint64_t i = 0; i < 60000; ++i) ways.push_back(sample_entry(i));
   region.trace_radiance(ways);
   Average radiance_scale;
   for (const BentRay& way : ways) radiance_scale.add(way.radiance_scale);
@@ -129,10 +132,8 @@ struct Sensor {
   /// A point of the plate and a direction on the side of its normal, with the density cos θ / π.
   static BentRay start(const Plate& plate, double side, std::uint64_t index) {
     PathSampler sampler{7, index, 0, 0};
-    BentRay ray;
-    ray.position = plate.to_world(sampler.next_2d().cwiseProduct(plate.resolution.cast<double>()));
-    ray.direction = frame_about(side * plate.normal()) * square_to_cosine_hemisphere(sampler.next_2d());
-    return ray;
+    const Vector3d position = plate.to_world(sampler.next_2d().cwiseProduct(plate.resolution.cast<double>()));
+    return ray_of(position, frame_about(side * plate.normal()) * square_to_cosine_hemisphere(sampler.next_2d()));
   }
 
   /// Flux on the sensor by photons.
@@ -204,12 +205,9 @@ constexpr int bands = 32;
 std::vector<BentRay> ways_of(const Vector3d& position, const Vector3d& direction, double tolerance) {
   std::vector<BentRay> ways;
   for (int band = 1; band < bands; band += 4) {
-    BentRay way;
-    way.band = band;
-    way.position = position;
-    way.direction = direction.normalized();
-    way.tolerance = tolerance;
-    ways.push_back(way);
+    ways.push_back(ray_of(position, direction.normalized()));
+    ways.back().band = band;
+    ways.back().tolerance = tolerance;
   }
   return ways;
 }

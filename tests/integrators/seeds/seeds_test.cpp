@@ -134,17 +134,17 @@ TEST(SeedFiles, ErrorsAreShortLines) {
 }
 
 TEST(SeedFiles, SayWhichLineIsWrong) {
-  const auto expect = [](const std::string& text, const std::string& words) {
-    EXPECT_THAT(complaint(text), AllOf(HasSubstr("seeds.txt: "), HasSubstr(words)));
-  };
-  expect("1 2 3\n4 5\n", "line 2: a seed is three numbers (x y z), or six (x y z and a direction), not 2");
-  expect("1 2 3\n1 2 3 0 0 1\n", "line 2: all lines must have the same number of values: the lines above have 3");
-  expect("1 2 3\n4 five 6\n", "line 2: \"five\" is not a finite number");
-  expect("1 2 nan\n", "line 1: \"nan\" is not a finite number");
-  expect("1 2 3 0 0 0\n", "line 1: the direction has length zero");
-  expect("x y z\na b c\n", "line 2: \"a\" is not a finite number");
-  expect("x,y,z\n", "contains no seeds");
-  expect("# nothing\n", "contains no seeds");
+  const std::pair<std::string, std::string> wrong[]{
+      {"1 2 3\n4 5\n", "line 2: a seed is three numbers (x y z), or six (x y z and a direction), not 2"},
+      {"1 2 3\n1 2 3 0 0 1\n", "line 2: all lines must have the same number of values: the lines above have 3"},
+      {"1 2 3\n4 five 6\n", "line 2: \"five\" is not a finite number"},
+      {"1 2 nan\n", "line 1: \"nan\" is not a finite number"},
+      {"1 2 3 0 0 0\n", "line 1: the direction has length zero"},
+      {"x y z\na b c\n", "line 2: \"a\" is not a finite number"},
+      {"x,y,z\n", "contains no seeds"},
+      {"# nothing\n", "contains no seeds"}};
+  for (const auto& [text, words] : wrong)
+    EXPECT_THAT(complaint(text), AllOf(HasSubstr("seeds.txt: "), HasSubstr(words))) << text;
   EXPECT_THAT(message([] { read_seeds("/nowhere/seeds.csv"); }), HasSubstr("/nowhere/seeds.csv"));
 }
 
