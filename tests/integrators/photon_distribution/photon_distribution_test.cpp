@@ -35,7 +35,6 @@ TEST(PhotonDistribution, EveryRayIsAccountedFor) {
   for (const DensityKind kind : {DensityKind::gaussian, DensityKind::histogram, DensityKind::photon_differential}) {
     settings.density.kind = kind;
     const PhotonDistribution light = distribute(bench, channels(4), settings);
-    const Plate& plate = *bench.geometry.surfaces().plate;
     for (int channel = 0; channel < 4; ++channel) {
       const EndCounts& ends = light.ends[channel];
       EXPECT_EQ(light.emitted[channel], light.positions);
@@ -43,7 +42,8 @@ TEST(PhotonDistribution, EveryRayIsAccountedFor) {
       for (const RayEnd end : {RayEnd::plate, RayEnd::missed, RayEnd::obstacle})
         EXPECT_GT(ends[static_cast<int>(end)], 0u) << to_string(end);
       const double* const film = light.irradiance.plane(channel);
-      const double on_film = std::accumulate(film, film + light.irradiance.plane_size(), 0.0) * plate.pixel_area();
+      const double on_film =
+          std::accumulate(film, film + light.irradiance.plane_size(), 0.0) * bench.plate().pixel_area();
       const double deposited = static_cast<double>(ends[static_cast<int>(RayEnd::plate)]) * light.ray_area;
       EXPECT_NEAR(on_film, deposited, 1e-9 * deposited);
     }

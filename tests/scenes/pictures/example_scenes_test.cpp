@@ -15,6 +15,8 @@ std::vector<std::filesystem::path> scenes_in(const char* folder) {
   return scenes;
 }
 
+std::string name_of(const testing::TestParamInfo<std::filesystem::path>& scene) { return scene.param.stem().string(); }
+
 class ExampleScene : public Pictures, public ::testing::WithParamInterface<std::filesystem::path> {
  protected:
   /// Renders the scene, whose light bends.
@@ -36,8 +38,7 @@ TEST_P(ExampleScene, RendersAndBendsLight) {
            "camera.resolution=[48,48]", "integrator.max_samples=4"});
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, ExampleScene, ::testing::ValuesIn(scenes_in("scenes")),
-                         [](const auto& scene) { return scene.param.stem().string(); });
+INSTANTIATE_TEST_SUITE_P(Scenes, ExampleScene, testing::ValuesIn(scenes_in("scenes")), name_of);
 
 double luminance(const Image& image, int x, int y) {
   const float* pixel = image.pixel(x, y);
@@ -60,8 +61,7 @@ TEST_P(WholeExample, HasNoFireflies) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, WholeExample, ::testing::ValuesIn(scenes_in("scenes/whole")),
-                         [](const auto& scene) { return scene.param.stem().string(); });
+INSTANTIATE_TEST_SUITE_P(Scenes, WholeExample, testing::ValuesIn(scenes_in("scenes/whole")), name_of);
 
 /// A picture of a point load. The plate reaches from −1.3 to 1.3 along both axes.
 class PointLoadPicture : public Pictures {

@@ -158,11 +158,10 @@ class MeshLight : public Pictures {
  protected:
   MeshLight() {
     write("scene.json", R"({
-      "field": { "generate": { "kind": "point_load", "resolution": 33 }, "eigenvalues": "absolute", "scale": 6 },
-      "light": { "direction": [0, 0, -1], "wavelengths": { "count": 8 } },
-      "receiver": { "distance": 0.5, "size": [2.6, 2.6], "resolution": [96, 96] },
-      "integrator": { "type": "photon_distribution" }
-    })");
+      "field": {"generate": {"kind": "point_load", "resolution": 33}, "eigenvalues": "absolute", "scale": 6},
+      "light": {"direction": [0, 0, -1], "wavelengths": {"count": 8}},
+      "receiver": {"distance": 0.5, "size": [2.6, 2.6], "resolution": [96, 96]},
+      "integrator": {"type": "photon_distribution"}})");
   }
 };
 
