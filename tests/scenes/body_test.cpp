@@ -1,12 +1,8 @@
-
-#include "base/geometry/box.h"
-#include "renderer/meshes/mesh.h"
 #include "scenes/outputs/body_outline.h"
-#include "scenes/scene/scene.h"
-#include "tests/files.h"
 #include "tests/renderer/shapes.h"
-#include "tests/scenes/read_scene_fixture.h"
+#include "tests/scenes/pictures/pictures.h"
 #include "tests/scenes/small_scene.h"
+#include "tests/tracing/support.h"
 #include "volumes/files/tensor_files.h"
 
 namespace tensorray {
@@ -14,23 +10,23 @@ namespace {
 
 /// A field of 9³ voxels, and a surface that reaches `beyond` voxels further.
 TensorGrid grid_of_body(double beyond) {
-  TensorGrid grid =
-      dense_grid({Vector3i(0, 0, 0), Vector3i(8, 8, 8)}, Eigen::Affine3d::Identity(), [](const Vector3i& i) {
-        const Vector3d p = i.cast<double>() / 8;
-        return Eigen::Matrix3d(Vector3d(1 + p.x(), 2 - p.y(), p.z()).asDiagonal());
-      });
-  grid.surface = box_mesh({Vector3d::Constant(-beyond), Vector3d::Constant(8 + beyond)}, Eigen::Affine3d::Identity());
+  TensorGrid grid = dense_grid({Vector3i(0, 0, 0), Vector3i(8, 8, 8)}, Affine3d::Identity(), [](const Vector3i& i) {
+    const Vector3d p = i.cast<double>() / 8;
+    return Matrix3d(Vector3d(1 + p.x(), 2 - p.y(), p.z()).asDiagonal());
+  });
+  grid.surface = box_between(Vector3d::Constant(-beyond), Vector3d::Constant(8 + beyond));
   return grid;
 }
 
-class BodyScene : public test::ReadScene {
+class BodyScene : public Pictures {
  protected:
-  void write(const TensorGrid& grid) const { write_tensor_vdb(folder_ / "field.vdb", grid); }
+  BodyScene() { write("scene.json", small_scene(R"({"file": "field.vdb"})")); }
 
-  SceneDescription describe(const test::Overrides& changes) const {
-    return read(changes, test::small_scene(R"({"file": "field.vdb"})"));
+  void write_field(const TensorGrid& grid) const { write_tensor_vdb(in_folder("field.vdb"), grid); }
+  SceneDescription describe(const Settings& changes) const {
+    return read_scene(in_folder("scene.json"), {changes, {}});
   }
-  Scene load(const test::Overrides& changes = {}) const { return load_scene(describe(changes), Progress()); }
+  Scene load(const Settings& changes = {}) const { return load_scene(describe(changes), Progress()); }
 };
 
 std::size_t triangles_of_cut(const Scene& scene) {
@@ -39,7 +35,7 @@ std::size_t triangles_of_cut(const Scene& scene) {
 }
 
 TEST_F(BodyScene, EndsAtItsSurface) {
-  write(grid_of_body(0.4));
+  write_field(grid_of_body(0.4));
   const Scene scene = load();
   EXPECT_EQ(triangles_of_cut(scene), 12u);
   EXPECT_EQ(scene.field.interpolant(), (Interpolant{Interpolation::cubic, Border::extend}));
@@ -48,18 +44,17 @@ TEST_F(BodyScene, EndsAtItsSurface) {
   EXPECT_EQ(load({"field.border=fade"}).field.interpolant().border, Border::fade);
   EXPECT_EQ(load({"field.smooth=0.5"}).field.index_bounds().max(), Vector3d(9, 9, 9)) << "preprocessing keeps it";
   EXPECT_EQ(load({"field.bounds=auto"}).field_key, load({"field.bounds=auto", "field.scale=2"}).field_key);
-  write(grid_of_body(2.5));
+  write_field(grid_of_body(2.5));
   EXPECT_THAT(load().notes, Contains(HasSubstr("0.5 voxels beyond")));
 }
 
 /// As a field without a surface, in all its bits.
 TEST_F(BodyScene, NoneIsTheBoxAlone) {
-  const test::Overrides none{"field.bounds=none"};
-  write(grid_of_body(0.4));
-  const Scene scene = load(none);
+  write_field(grid_of_body(0.4));
+  const Scene scene = load({"field.bounds=none"});
   TensorGrid plain = grid_of_body(0);
   plain.surface = {};
-  write(plain);
+  write_field(plain);
   const Scene other = load();
   EXPECT_EQ(triangles_of_cut(scene), 0u);
   EXPECT_EQ(scene.field.index_bounds().max(), Vector3d(8, 8, 8));
@@ -70,37 +65,30 @@ TEST_F(BodyScene, NoneIsTheBoxAlone) {
 }
 
 TEST_F(BodyScene, AnotherMeshReplacesIt) {
-  write(grid_of_body(0.4));
-  const auto tetrahedron = "v 1 1 1\nv 7 1 1\nv 1 7 1\nv 1 1 7\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
-  std::ofstream(folder_ / "other.obj") << tetrahedron;
+  write_field(grid_of_body(0.4));
+  write("other.obj", "v 1 1 1\nv 7 1 1\nv 1 7 1\nv 1 1 7\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");  // A tetrahedron.
   const std::optional<Scene> scene(load({"field.bounds=other.obj"}));
   EXPECT_EQ(triangles_of_cut(*scene), 4u);
   EXPECT_THAT(scene->notes, Not(Contains(HasSubstr("body:"))));
   // The field is the same: the live view does not load it again.
   EXPECT_TRUE(field_of(scene, describe({"field.bounds=other.obj", "field.scale=3"})));
-  EXPECT_THAT(error({"field.bounds=nothing"}), AllOf(HasSubstr("/field/bounds"), HasSubstr("none")));
+  expect_error(2, "/field/bounds.*none", {"field.bounds=nothing"});
 }
 
 TEST_F(BodyScene, ASurfaceThatIsOpenIsAnError) {
   TensorGrid grid = grid_of_body(0);
   grid.surface.triangles.pop_back();
-  write(grid);
-  EXPECT_THAT(message([&] { load(); }),
-              AllOf(HasSubstr("field.vdb"), HasSubstr("3 open edges"), HasSubstr("`field.bounds: \"none\"`")));
+  write_field(grid);
+  expect_error(1, "field.vdb.*3 open edges.*`field.bounds: \"none\"`", {});
   EXPECT_EQ(triangles_of_cut(load({"field.bounds=none"})), 0u);
 }
 
 /// 100 × 100 pixels of one unit, below everything; seen from above.
 Plate outline_plate() {
-  Plate plate;
-  plate.center = {0, 0, -10};
+  Plate plate = plate_across({0, 0, -1}, 10);
   plate.size = {100, 100};
   plate.resolution = {100, 100};
   return plate;
-}
-
-TriangleMesh outline_box(const Vector3d& min, const Vector3d& max) {
-  return box_mesh({min, max}, Eigen::Affine3d::Identity());
 }
 
 /// The length of the strokes between two points that are visible, and of those that are hidden.
@@ -108,9 +96,8 @@ Vector2d stroke_lengths(const std::vector<OutlineStroke>& strokes, const Vector2
   Vector2d sum(0, 0);
   const Vector2d along = (b - a).normalized();
   const auto is_on = [&](const Vector2d& p) {
-    const Vector2d from = p - a;
-    return (from - from.dot(along) * along).norm() < 1e-9 && from.dot(along) > -1e-9 &&
-           from.dot(along) < (b - a).norm() + 1e-9;
+    const double place = std::clamp((p - a).dot(along), 0.0, (b - a).norm());
+    return (a + place * along - p).norm() < 1e-9;
   };
   for (const OutlineStroke& stroke : strokes)
     if (is_on(stroke.from) && is_on(stroke.to)) sum[stroke.is_hidden ? 1 : 0] += (stroke.to - stroke.from).norm();
@@ -126,7 +113,7 @@ double outline_length(const std::vector<OutlineStroke>& strokes) {
 /// A box of 20 × 10 × 8 in light that falls by one unit along x and two along y for each unit of height. Its corner
 /// (x, y, z) is at the pixel (50 + x + z + 10, 50 − y − 2 (z + 10)).
 TEST(BodyOutlineTest, ABoxHasItsTwelveEdgesAtKnownPixels) {
-  const auto strokes = body_outline({outline_box({-10, -5, 0}, {10, 5, 8})}, outline_plate(), {1, 2, -1});
+  const auto strokes = body_outline({box_between({-10, -5, 0}, {10, 5, 8})}, outline_plate(), {1, 2, -1});
   const auto at = [](double x, double y, double z) { return Vector2d(50 + x + z + 10, 50 - y - 2 * (z + 10)); };
   // The viewer is above, and on the side of −x and −y.
   for (const double z : {0.0, 8.0})
@@ -148,7 +135,7 @@ TEST(BodyOutlineTest, ABoxHasItsTwelveEdgesAtKnownPixels) {
 /// on each other.
 TEST(BodyOutlineTest, ABodyHidesTheLinesBehindIt) {
   const auto strokes =
-      body_outline({outline_box({-30, -30, -10}, {30, 30, -5}), outline_box({-40, -10, 0}, {0, 10, 5})},
+      body_outline({box_between({-30, -30, -10}, {30, 30, -5}), box_between({-40, -10, 0}, {0, 10, 5})},
                    outline_plate(), {0, 0, -1});
   const Vector2d left = stroke_lengths(strokes, {20, 20}, {20, 80});  // Edges of the lower box.
   EXPECT_NEAR(left[0], 2 * 40, 2);
@@ -158,13 +145,7 @@ TEST(BodyOutlineTest, ABodyHidesTheLinesBehindIt) {
 
 /// Two boxes that touch, whose inner faces lie on each other: as one. Each has vertices of its own.
 TEST(BodyOutlineTest, ShellsThatTouchHaveNoLineBetweenThem) {
-  TriangleMesh both = outline_box({-20, -5, 0}, {0, 5, 8});
-  const TriangleMesh right = outline_box({0, -5, 0}, {20, 5, 8});
-  for (auto triangle : right.triangles) {
-    for (std::uint32_t& corner : triangle) corner += static_cast<std::uint32_t>(both.vertices.size());
-    both.triangles.push_back(triangle);
-  }
-  both.vertices.insert(both.vertices.end(), right.vertices.begin(), right.vertices.end());
+  const TriangleMesh both = joined({box_between({-20, -5, 0}, {0, 5, 8}), box_between({0, -5, 0}, {20, 5, 8})});
   const auto strokes = body_outline({both}, outline_plate(), {0, 0, -1});
   EXPECT_NEAR(stroke_lengths(strokes, {50, 45}, {50, 55})[0], 0, 1e-9);
   EXPECT_NEAR(stroke_lengths(strokes, {30, 45}, {30, 55})[0], 2 * 10, 1e-9);

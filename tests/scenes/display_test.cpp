@@ -4,14 +4,13 @@
 
 #include "base/constants.h"
 #include "base/files/temporary_folder.h"
-#include "base/geometry/box.h"
 #include "base/process/progress.h"
 #include "integrators/methods/read_scene.h"
-#include "renderer/meshes/mesh.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "tests/files.h"
+#include "tests/tracing/support.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/making/generators.h"
 
@@ -25,24 +24,19 @@ enum class Part { none, lower_left, upper_left, beside };
 
 struct MethodCase {
   std::string name, text;
-  Part scale, legend;  ///< `none`: it is left out, with a warning. Axes are always there.
+  bool has_legend;  ///< If not, it is left out, with a warning. The scale and the axes are always there.
 };
 
 const std::vector<MethodCase> methods{
-    {"photons", R"({"integrator": {"type": "photon_distribution"}})", Part::lower_left, Part::beside},
-    {"three colours", R"({"bending": {"rgb": [0.1, 0.2, 0.3]}, "integrator": {"type": "photon_distribution"}})",
-     Part::lower_left, Part::beside},
-    {"lens", R"({"integrator": {"type": "lens"}})", Part::lower_left, Part::none},
-    {"stretch", R"({"integrator": {"type": "stretch", "stretch": {"pixels": 200, "resolution": 8}}})", Part::lower_left,
-     Part::beside},
-    {"paths", R"({"integrator": {"type": "path_tracing"}})", Part::lower_left, Part::beside},
-    {"paths of one colour", R"({"integrator": {"type": "path_tracing", "color": {"by": "none"}}})", Part::lower_left,
-     Part::none},
-    {"paths from here", R"({"integrator": {"type": "path_tracing"}, "camera": {"position": [3, -4, 2]}})",
-     Part::lower_left, Part::beside},
-    {"parallel paths", R"({"integrator": {"type": "path_tracing"}, "camera": {"projection": "orthographic"}})",
-     Part::lower_left, Part::beside},
-    {"whole", R"({"integrator": {"type": "scene"}, "lights": [{"kind": "constant"}]})", Part::lower_left, Part::none},
+    {"photons", R"({"integrator": {"type": "photon_distribution"}})", true},
+    {"three colours", R"({"bending": {"rgb": [0.1, 0.2, 0.3]}, "integrator": {"type": "photon_distribution"}})", true},
+    {"lens", R"({"integrator": {"type": "lens"}})", false},
+    {"stretch", R"({"integrator": {"type": "stretch", "stretch": {"pixels": 200, "resolution": 8}}})", true},
+    {"paths", R"({"integrator": {"type": "path_tracing"}})", true},
+    {"paths of one colour", R"({"integrator": {"type": "path_tracing", "color": {"by": "none"}}})", false},
+    {"paths from here", R"({"integrator": {"type": "path_tracing"}, "camera": {"position": [3, -4, 2]}})", true},
+    {"parallel paths", R"({"integrator": {"type": "path_tracing"}, "camera": {"projection": "orthographic"}})", true},
+    {"whole", R"({"integrator": {"type": "scene"}, "lights": [{"kind": "constant"}]})", false},
 };
 
 struct Rendered {
@@ -51,6 +45,8 @@ struct Rendered {
   Image display;
 };
 
+Scene loaded(const Json& json) { return load_scene(read_scene_json(json, "scene.json"), Progress()); }
+
 /// @param annotations  The value of the key; null: it is not given.
 Rendered rendered(const MethodCase& method, const Json& annotations) {
   Json json = Json::parse(method.text);
@@ -58,54 +54,47 @@ Rendered rendered(const MethodCase& method, const Json& annotations) {
   json["light"] = {{"photons", 2000}, {"wavelengths", {{"count", 4}}}};
   json["receiver"] = {{"size", {2.5, 2.5}}, {"resolution", {size, size}}};
   json["camera"]["resolution"] = {size, size};
-  for (const auto& [key, value] : {std::pair("max_samples", 1), {"min_samples", 1}, {"bands", 8}})
-    json["integrator"][key] = value;
-  json["integrator"]["seeds"] = {{"count", 20}};
+  json["integrator"].update({{"max_samples", 1}, {"min_samples", 1}, {"bands", 8}, {"seeds", {{"count", 20}}}});
   if (!annotations.is_null()) json["output"] = {{"annotations", annotations}};
-  Scene scene = load_scene(read_scene_json(json, "scene.json"), Progress());
+  Scene scene = loaded(json);
   Render render = tensorray::render(scene, Progress());
   Image display = display_image(scene, render, true);
   return {std::move(scene), std::move(render), std::move(display)};
 }
 
 bool is_within(Part part, int x, int y) {
-  switch (part) {
-    case Part::lower_left:
-      return 3 * x < 2 * size && 4 * y > 3 * size;
-    case Part::upper_left:
-      return 2 * x < size && 2 * y < size;
-    default:
-      return false;
-  }
+  return (part == Part::lower_left && 3 * x < 2 * size && 4 * y > 3 * size) ||
+         (part == Part::upper_left && 2 * x < size && 2 * y < size);
 }
 
 /// Expects that two pictures differ within a part of them, or beside the smaller one, and nowhere else.
-void expect_only_within(Part part, const Image& with, const Image& without, const std::string& what) {
-  ASSERT_EQ(with.channels, without.channels) << what;
+void expect_only_within(Part part, const Image& with, const Image& without) {
+  ASSERT_EQ(with.channels, without.channels);
   std::size_t within = 0, elsewhere = 0;
   for (int y = 0; y < without.height; ++y)
     for (int x = 0; x < without.width; ++x)
       if (!std::equal(with.pixel(x, y), with.pixel(x, y) + with.channels.size(), without.pixel(x, y)))
         ++(is_within(part, x, y) ? within : elsewhere);
-  EXPECT_EQ(within > 20, part != Part::none && part != Part::beside) << what;
-  EXPECT_EQ(with.width > without.width, part == Part::beside) << what;
-  EXPECT_EQ(elsewhere, 0u) << what;
+  EXPECT_EQ(within > 20, part != Part::none && part != Part::beside);
+  EXPECT_EQ(with.width > without.width, part == Part::beside);
+  EXPECT_EQ(elsewhere, 0u);
 }
 
 TEST(Annotations, AreInTheirCornersAndNowhereElse) {
   for (const MethodCase& method : methods) {
     const Rendered plain = rendered(method, Json::array());
-    const std::vector<std::pair<std::string, Part>> parts{
-        {"scale", method.scale}, {"axes", Part::upper_left}, {"legend", method.legend}};
+    const std::vector<std::pair<std::string, Part>> parts{{"scale", Part::lower_left},
+                                                          {"axes", Part::upper_left},
+                                                          {"legend", method.has_legend ? Part::beside : Part::none}};
     for (const auto& [annotation, part] : parts) {
+      SCOPED_TRACE(annotation + " of " + method.name);
       const Rendered annotated = rendered(method, annotation);
-      const std::string what = annotation + " of " + method.name;
-      expect_only_within(part, annotated.display, plain.display, what);
-      EXPECT_EQ(annotated.render.linear.pixels, plain.render.linear.pixels) << what;  // What an EXR holds.
+      expect_only_within(part, annotated.display, plain.display);
+      EXPECT_EQ(annotated.render.linear.pixels, plain.render.linear.pixels);  // What an EXR holds.
       const std::size_t warnings = annotated.render.warnings.size() - plain.render.warnings.size();
-      EXPECT_EQ(warnings, part == Part::none ? 1u : 0u) << what;
+      EXPECT_EQ(warnings, part == Part::none ? 1u : 0u);
       if (part == Part::none) {
-        EXPECT_THAT(annotated.render.warnings.back(), HasSubstr("/output/annotations")) << what;
+        EXPECT_THAT(annotated.render.warnings.back(), HasSubstr("/output/annotations"));
       }
     }
   }
@@ -116,42 +105,39 @@ TEST(Annotations, AreInTheirCornersAndNowhereElse) {
 /// legend.
 TEST(Annotations, OfTubesAndStretchAreThereByDefault) {
   for (const MethodCase& method : methods) {
+    SCOPED_TRACE(method.name);
     const Rendered plain = rendered(method, Json::array()), usual = rendered(method, nullptr);
     const Json json = Json::parse(method.text), type = json["integrator"]["type"];
-    const bool is_given = json.value("camera", Json::object()).contains("position");
-    const bool has_legend = (type == "path_tracing" || type == "stretch") && method.legend == Part::beside;
-    EXPECT_EQ(usual.display.pixels != plain.display.pixels, type == "path_tracing" || type == "stretch") << method.name;
-    EXPECT_EQ(usual.display.width > plain.display.width, type == "stretch" || is_given) << method.name;
-    EXPECT_EQ(usual.render.linear.pixels != plain.render.linear.pixels,
-              type == "path_tracing" && has_legend && !is_given)
-        << method.name;
-    EXPECT_EQ(usual.render.warnings.size(), plain.render.warnings.size()) << method.name;
-    const bool has_note = type == "path_tracing" && usual.render.view->is_perspective;
-    EXPECT_EQ(usual.render.notes.size(), plain.render.notes.size() + (has_note ? 1 : 0)) << method.name;
+    const bool is_given = json.value("camera", Json::object()).contains("position"), has_tubes = type == "path_tracing";
+    EXPECT_EQ(usual.display.pixels != plain.display.pixels, has_tubes || type == "stretch");
+    EXPECT_EQ(usual.display.width > plain.display.width, type == "stretch" || is_given);
+    EXPECT_EQ(usual.render.linear.pixels != plain.render.linear.pixels, has_tubes && method.has_legend && !is_given);
+    EXPECT_EQ(usual.render.warnings.size(), plain.render.warnings.size());
+    const bool has_note = has_tubes && usual.render.view->is_perspective;
+    EXPECT_EQ(usual.render.notes.size(), plain.render.notes.size() + (has_note ? 1 : 0));
     const Image preview = display_image(usual.scene, usual.render, true, 4);
-    EXPECT_EQ(preview.width > size, usual.display.width > size) << method.name;
+    EXPECT_EQ(preview.width > size, usual.display.width > size);
   }
 }
 
 /// The lines of a body, where there is one: an obstacle, at the bottom of the volume. In no other file.
 TEST(Annotations, ShowBodies) {
   const TemporaryFolder folder;
-  write_mesh(
-      folder / "box.ply",
-      box_mesh({Eigen::Vector3d(-0.5, -0.5, -0.9), Eigen::Vector3d(0.5, 0.5, -0.5)}, Eigen::Affine3d::Identity()), {});
+  write_mesh(folder / "box.ply", box_between({-0.5, -0.5, -0.9}, {0.5, 0.5, -0.5}), {});
   for (const MethodCase& method : methods) {
+    SCOPED_TRACE(method.name);
     const bool has_lines = method.name == "photons" || method.name == "three colours" || method.name == "lens";
     MethodCase with = method;
     Json json = Json::parse(method.text);
     json["obstacles"] = {{{"file", (folder / "box.ply").string()}}};
     with.text = json.dump();
     const Rendered plain = rendered(with, Json::array()), visible = rendered(with, "body");
-    EXPECT_EQ(visible.display.pixels != plain.display.pixels, has_lines) << method.name;
+    EXPECT_EQ(visible.display.pixels != plain.display.pixels, has_lines);
     if (has_lines) {
-      EXPECT_EQ(rendered(with, nullptr).display.pixels, visible.display.pixels) << method.name;
+      EXPECT_EQ(rendered(with, nullptr).display.pixels, visible.display.pixels);
     }
-    EXPECT_EQ(visible.render.linear.pixels, plain.render.linear.pixels) << method.name;
-    EXPECT_EQ(visible.render.warnings.size() - plain.render.warnings.size(), has_lines ? 0u : 1u) << method.name;
+    EXPECT_EQ(visible.render.linear.pixels, plain.render.linear.pixels);
+    EXPECT_EQ(visible.render.warnings.size() - plain.render.warnings.size(), has_lines ? 0u : 1u);
   }
   EXPECT_THAT(rendered(methods[0], "body").render.warnings.back(), HasSubstr("no lines of a body"));
 }
@@ -166,7 +152,7 @@ FieldUnits units_with(const ImageMetadata& metadata, const Json& field, const Js
             {"world", world},
             {"integrator", {{"type", "stretch"}}}};
   json["field"].update(field);
-  return units_of(load_scene(read_scene_json(json, "scene.json"), Progress()));
+  return units_of(loaded(json));
 }
 
 /// A scene's units are its own, else those of the field's file.
@@ -206,12 +192,12 @@ TEST(Annotations, KnowTheSizeOfPixels) {
   plate.size = {3, 2};
   plate.resolution = {600, 100};
   EXPECT_DOUBLE_EQ(picture_view(plate).pixel_size, 0.005);
-  const Eigen::Vector3d position(0, -5, 0), target(0, 0, 0), up(0, 0, 1);
+  const Vector3d position(0, -5, 0), target(0, 0, 0), up(0, 0, 1);
   const Camera parallel = orthographic_camera(position, target, up, 4, {100, 200});
   EXPECT_DOUBLE_EQ(picture_view(parallel).pixel_size, 0.02);
   EXPECT_FALSE(picture_view(parallel).is_perspective);
-  EXPECT_TRUE(picture_view(parallel).right.isApprox(Eigen::Vector3d::UnitX()));
-  EXPECT_TRUE(picture_view(parallel).up.isApprox(Eigen::Vector3d::UnitZ()));
+  EXPECT_TRUE(picture_view(parallel).right.isApprox(Vector3d::UnitX()));
+  EXPECT_TRUE(picture_view(parallel).up.isApprox(Vector3d::UnitZ()));
   const PictureView perspective = picture_view(perspective_camera(position, target, up, 30, {100, 200}));
   EXPECT_TRUE(perspective.is_perspective);
   EXPECT_DOUBLE_EQ(perspective.pixel_size, 5 * 2 * std::tan(15 * pi / 180) / 200);  // At the target.
@@ -241,39 +227,36 @@ TEST(Captions, HaveTheValuesOfKeys) {
   }
 }
 
-SceneDescription described(const Json& annotations) {
-  return read_scene_json({{"field", {{"file", "a.vdb"}}},
-                          {"integrator", {{"type", "photon_distribution"}}},
-                          {"output", {{"annotations", annotations}}}},
-                         "scene.json");
+std::vector<Annotation> annotations_of(const Json& integrator, const Json& output) {
+  const Json json{{"field", {{"file", "a.vdb"}}}, {"integrator", integrator}, {"output", output}};
+  return read_scene_json(json, "scene.json").output.annotations;
 }
 
 TEST(Annotations, AreAListOfNames) {
-  EXPECT_THAT(described(Json::array()).output.annotations, IsEmpty());
-  EXPECT_THAT(described({"legend", "scale"}).output.annotations, ElementsAre(Annotation::legend, Annotation::scale));
-  EXPECT_THAT(described("axes").output.annotations, ElementsAre(Annotation::axes));
+  const auto named = [](const Json& names) {
+    return annotations_of({{"type", "photon_distribution"}}, {{"annotations", names}});
+  };
+  EXPECT_THAT(named(Json::array()), IsEmpty());
+  EXPECT_THAT(named({"legend", "scale"}), ElementsAre(Annotation::legend, Annotation::scale));
+  EXPECT_THAT(named("axes"), ElementsAre(Annotation::axes));
+  for (const Json& wrong : {Json("bar"), Json({"axes", "bar"}), Json({"axes", "axes"}), Json(true), Json({1, 2})}) {
+    EXPECT_THAT(message([&] { named(wrong); }),
+                HasSubstr(R"(`/output/annotations` must be a list of "scale", "axes", "legend", "body", "hidden")"));
+  }
   const auto of_paths = [](const Json& color) {
-    return read_scene_json(
-               {{"field", {{"file", "a.vdb"}}}, {"integrator", {{"type", "path_tracing"}, {"color", color}}}},
-               "scene.json")
-        .output.annotations;
+    return annotations_of({{"type", "path_tracing"}, {"color", color}}, Json::object());
   };
   EXPECT_THAT(of_paths({{"legend", false}}), ElementsAre(Annotation::scale));
   for (const Json& color : {Json::object(), Json{{"legend", true}}})
     EXPECT_THAT(of_paths(color), ElementsAre(Annotation::scale, Annotation::legend));
-  for (const Json& wrong : {Json("bar"), Json({"axes", "bar"}), Json({"axes", "axes"}), Json(true), Json({1, 2})}) {
-    EXPECT_THAT(message([&] { described(wrong); }),
-                HasSubstr(R"(`/output/annotations` must be a list of "scale", "axes", "legend", "body", "hidden")"));
-  }
 }
 
 // How bright scene-linear light is shown: the view and the exposure that are chosen where the scene names none.
 
-Scene scene_of(const std::string& method, const Json& output) {
-  const Json json{{"field", {{"generate", {{"kind", "helix"}, {"resolution", 5}}}, {"scale", 0.6}}},
-                  {"integrator", {{"type", method}}},
-                  {"output", output}};
-  return load_scene(read_scene_json(json, "scene.json"), Progress());
+Scene scene_shown(const Json& output) {
+  return loaded({{"field", {{"generate", {{"kind", "helix"}, {"resolution", 5}}}, {"scale", 0.6}}},
+                 {"integrator", {{"type", "photon_distribution"}}},
+                 {"output", output}});
 }
 
 /// Pixels of these values, a hundred of each.
@@ -287,7 +270,7 @@ Render light_of(const std::vector<float>& values) {
 double srgb(double linear) { return 1.055 * std::pow(linear, 1 / 2.4) - 0.055; }
 
 TEST(Exposure, UndisturbedLightIsLightGreyAndBrightLightIsBelowWhite) {
-  const Scene scene = scene_of("photon_distribution", Json::object());
+  const Scene scene = scene_shown(Json::object());
   const std::vector<float> light{0, 0.25f, 1, 2, 6};
   const Image shown = display_image(scene, light_of(light), true);
   for (std::size_t i = 1; i < light.size(); ++i)
@@ -295,21 +278,15 @@ TEST(Exposure, UndisturbedLightIsLightGreyAndBrightLightIsBelowWhite) {
 }
 
 TEST(Exposure, IsChosenWhereLightIsDarkOrMuchIsBright) {
-  const Scene scene = scene_of("photon_distribution", Json::object());
+  const Scene scene = scene_shown(Json::object());
   EXPECT_EQ(display_exposure(scene, light_of({0, 0, 0})), 0);
   EXPECT_EQ(display_exposure(scene, light_of({0, 0.5f, 1})), 0);
   EXPECT_EQ(display_exposure(scene, light_of({1, 8})), 0);
   EXPECT_NEAR(display_exposure(scene, light_of({0, 0.1f, 0.25f})), 2, 1e-12);
   EXPECT_NEAR(display_exposure(scene, light_of({1, 32})), -2, 1e-12);
-}
-
-TEST(Exposure, OfOtherViewsHasTheBrightestHundredthBelowWhite) {
-  const Scene scene = scene_of("photon_distribution", {{"view", "Un-tone-mapped"}});
-  EXPECT_NEAR(display_exposure(scene, light_of({1, 3.6f})), -2, 1e-6);
-}
-
-TEST(Exposure, IsTheScenesIfItNamesOne) {
-  EXPECT_EQ(display_exposure(scene_of("photon_distribution", {{"exposure", -1.5}}), light_of({1, 32})), -1.5);
+  // Another view has the brightest hundredth below white. A scene may name the exposure.
+  EXPECT_NEAR(display_exposure(scene_shown({{"view", "Un-tone-mapped"}}), light_of({1, 3.6f})), -2, 1e-6);
+  EXPECT_EQ(display_exposure(scene_shown({{"exposure", -1.5}}), light_of({1, 32})), -1.5);
 }
 
 }  // namespace

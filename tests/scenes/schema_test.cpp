@@ -46,9 +46,9 @@ void collect(const Json& schema, const Pointer& pointer, const Json& scene, std:
   }
 }
 
-std::vector<Leaf> leaves() {
+std::vector<Leaf> leaves(SchemaKind kind = SchemaKind::one_frame) {
   std::vector<Leaf> all;
-  collect(Json::parse(scene_schema()), Pointer(), smallest_scene(), all);
+  collect(Json::parse(scene_schema(kind)), Pointer(), smallest_scene(), all);
   return all;
 }
 
@@ -72,11 +72,9 @@ std::string refusal(const Leaf& leaf, const Json& value) {
 TEST(Schema, KeyframesTakeThePlaceOfNumbersAndListsOfNumbers) {
   const Json schema = Json::parse(scene_schema(SchemaKind::with_keyframes));
   EXPECT_EQ(schema.at("/$defs/keyframes/required"_json_pointer), Json::array({"keys"}));
-  std::vector<Leaf> all;
-  collect(schema, Pointer(), smallest_scene(), all);
   const Json reference = {{"$ref", "#/$defs/keyframes"}};
   int allowed = 0, others = 0;
-  for (const Leaf& leaf : all) {
+  for (const Leaf& leaf : leaves(SchemaKind::with_keyframes)) {
     const Json standard = leaf.schema.value("default", Json());
     const bool is_of_numbers =
         standard.is_number() || (standard.is_array() && !standard.empty() && standard[0].is_number());

@@ -44,18 +44,13 @@ const std::vector<SceneCase> scenes{
 };
 
 /// Writes lengths of a scene in a unit.
-std::string in_unit(const std::string& text, double unit) {
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] != '$') {
-      result += text[i];
-      continue;
-    }
+std::string in_unit(std::string text, double unit) {
+  for (std::size_t at = text.find('$'); at != std::string::npos; at = text.find('$')) {
     std::size_t digits = 0;
-    result += fmt::format("{}", unit * std::stod(text.substr(i + 1), &digits));
-    i += digits;
+    const double length = unit * std::stod(text.substr(at + 1), &digits);
+    text.replace(at, 1 + digits, fmt::format("{}", length));
   }
-  return result;
+  return text;
 }
 
 Image picture_of(const SceneCase& one, double unit) {

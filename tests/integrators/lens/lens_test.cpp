@@ -1,10 +1,12 @@
 #include "integrators/lens/lens.h"
 
 #include <map>
+#include <numeric>
 
 #include <Eigen/LU>
 #include <tbb/global_control.h>
 
+#include "renderer/sampling/random.h"
 #include "tests/tracing/support.h"
 
 namespace tensorray {
@@ -21,23 +23,30 @@ Plate lens_plate(double z, const Vector2d& size, const Vector2i& resolution = {1
   return plate;
 }
 
-/// Noise without a pattern, from SplitMix64.
+/// Noise without a pattern.
 Image noise(int width, int height) {
   Image image(width, height, {"R", "G", "B"});
-  std::uint64_t state = 1;
-  for (float& value : image.pixels) {
-    std::uint64_t z = state += 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    value = static_cast<float>((z ^ (z >> 31)) >> 40) / (1 << 24);
-  }
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(random_uniform(1, i, 0));
   return image;
 }
 
-Image uniform(float value) {
-  Image image(16, 16, {"R", "G", "B"});
-  std::fill(image.pixels.begin(), image.pixels.end(), value);
+/// A square of greys.
+Image grey(int size, const std::function<double(int x, int y)>& value) {
+  Image image(size, size, {"R", "G", "B"});
+  for (int y = 0; y < size; ++y)
+    for (int x = 0; x < size; ++x) std::fill_n(image.pixel(x, y), 3, static_cast<float>(value(x, y)));
   return image;
+}
+
+Image uniform(double value) {
+  return grey(16, [value](int, int) { return value; });
+}
+
+/// The tensor by which light along z bends towards a vector.
+Matrix3d bends_along_z(const Vector3d& towards) {
+  Matrix3d T = Matrix3d::Zero();
+  T.col(2) = towards;
+  return T;
 }
 
 BendingSettings precise_bending() {
@@ -46,66 +55,69 @@ BendingSettings precise_bending() {
   return settings;
 }
 
-/// Light along +z from an image to a receiver, either 1.5 from the middle of the field. The channels are R, G and B.
+/// Light along +z of the flexibility 0.1 from an image to a receiver, either 1.5 from the middle of the field.
 struct Bench {
   TensorField field;
   Surfaces surfaces;
   BendingSettings bending = precise_bending();
-  std::vector<LightChannel> channels;
   Plate receiver;
   Texture texture;
   LensImage image;
   LensSettings settings;
 
   Bench(TensorField field_, const Plate& receiver_, const Vector2d& image_size, Image picture, Wrap wrap = Wrap::none)
-      : field(std::move(field_)),
-        surfaces(surfaces_of(field)),
-        channels{{0.1, 0, 1}},
-        receiver(receiver_),
-        texture(std::move(picture), wrap) {
+      : field(std::move(field_)), surfaces(surfaces_of(field)), receiver(receiver_), texture(std::move(picture), wrap) {
     image.texture = &texture;
     image.plane = lens_plate(-1.5, image_size);
     image.wraps = wrap == Wrap::repeat || wrap == Wrap::mirror;
+    settings.flexibilities = {0.1};
   }
 
-  static void radiance(const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
-    std::copy(rgb.data() + first, rgb.data() + last, radiances);
-  }
-
-  LensPicture simulate(LensMode mode, const Progress& progress = Progress()) const {
+  /// The red of the image, as the one channel of these bands.
+  LensPicture simulate(LensMode mode, const std::vector<LensBand>& bands, const Progress& progress) const {
     LensSettings with_mode = settings;
     with_mode.mode = mode;
-    std::vector<LensBand> bands;
-    for (std::size_t i = 0; i < channels.size(); ++i) {
-      with_mode.flexibilities.push_back(channels[i].flexibility);
-      const double place = channels.size() > 1 ? static_cast<double>(i) / static_cast<double>(channels.size() - 1) : 0;
-      bands.push_back({place, place, i, 1, Vector3d::Unit(static_cast<int>(i))});
-    }
     const LensLight light =
         trace_lens(field, surfaces, bending, {receiver, image, Vector3d::UnitZ()}, with_mode, progress);
-    return draw_lens(light, bands, radiance, channels.size(), true, progress);
+    const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+      std::fill(radiances, radiances + (last - first), rgb.x());
+    };
+    return draw_lens(light, bands, radiance, 1, true, progress);
+  }
+  LensPicture simulate(LensMode mode, const Progress& progress = Progress()) const {
+    return simulate(mode, {{0, 0, 0, 1, Vector3d::UnitX()}}, progress);
   }
 
-  /// Of one channel with flexibility `s`.
+  /// Of light of the flexibility `s`.
   LensPicture simulate(LensMode mode, double s) {
-    channels = {{s, 0, 1}};
+    settings.flexibilities = {s};
     return simulate(mode);
+  }
+
+  /// In the light of equal bands of a range of flexibilities, or of single ones.
+  LensPicture simulate(LensMode mode, const std::vector<double>& flexibilities, bool range, int count) {
+    settings.flexibilities = flexibilities;
+    settings.range = range;
+    std::vector<LensBand> bands;
+    for (int i = 0; i < count; ++i) {
+      const double begin = static_cast<double>(i) / (range ? count : count - 1);
+      bands.push_back({begin, range ? (i + 1.0) / count : begin, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
+    }
+    return simulate(mode, bands, Progress());
   }
 };
 
 TensorField no_field() { return constant_field(Matrix3d::Zero()); }
 
-const LensPoint& point_at(const LensPicture& picture, int x, int y) {
-  return picture.points[static_cast<std::size_t>(y * picture.color.width + x)];
+std::size_t index_of(const LensPicture& picture, int x, int y) {
+  return static_cast<std::size_t>(y * picture.color.width + x);
 }
 
-/// (s, t) at a pixel's centre.
-Vector2d center_of(int x, int y, const Vector2i& resolution) {
-  return {(x + 0.5) / resolution.x(), 1 - (y + 0.5) / resolution.y()};
-}
+const LensPoint& point_at(const LensPicture& picture, int x, int y) { return picture.points[index_of(picture, x, y)]; }
 
-/// Landings are single precision: an error of (s, t).
-constexpr double rounding = 5e-7;
+double radiance_at(const LensPicture& picture, int x, int y) {
+  return picture.radiance.values[index_of(picture, x, y)];
+}
 
 TEST(Lens, ASmallerImageLeavesPixelsThatSeeNothing) {
   const Image picture = noise(24, 16);
@@ -114,21 +126,20 @@ TEST(Lens, ASmallerImageLeavesPixelsThatSeeNothing) {
     const LensPicture seen = bench.simulate(mode);
     for (int y = 0; y < 32; ++y)
       for (int x = 0; x < 48; ++x) {
-        const std::size_t pixel = static_cast<std::size_t>(y * 48 + x);
         const bool inside = x >= 12 && x < 36 && y >= 8 && y < 24;
         const LensEnd nothing = mode == LensMode::gather ? LensEnd::outside : LensEnd::missed;
-        ASSERT_EQ(seen.points[pixel].end, inside ? LensEnd::image : nothing) << x << " " << y;
-        EXPECT_NEAR(seen.alpha[pixel], inside ? 1 : 0, 1e-6);
-        EXPECT_NEAR(seen.radiance.plane(0)[pixel], inside ? picture.pixel(x - 12, y - 8)[0] : 0, 1e-5);
-        if (!inside && mode == LensMode::gather) {
-          EXPECT_LT((seen.points[pixel].st - center_of(x - 12, y - 8, {24, 16})).norm(), 2 * rounding);
+        ASSERT_EQ(point_at(seen, x, y).end, inside ? LensEnd::image : nothing) << x << " " << y;
+        EXPECT_NEAR(seen.alpha[index_of(seen, x, y)], inside ? 1 : 0, 1e-6);
+        EXPECT_NEAR(radiance_at(seen, x, y), inside ? picture.pixel(x - 12, y - 8)[0] : 0, 1e-5);
+        if (!inside && mode == LensMode::gather) {  // Landings are single precision.
+          EXPECT_LT((point_at(seen, x, y).st - Vector2d((x - 11.5) / 24, 1 - (y - 7.5) / 16)).norm(), 1e-6);
         }
       }
   }
 }
 
 TEST(Lens, AnObstacleHidesTheImage) {
-  Bench bench(no_field(), lens_plate(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, uniform(0.5f), Wrap::clamp);
+  Bench bench(no_field(), lens_plate(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, uniform(0.5), Wrap::clamp);
   const double pixel = 1.5 / 48;  // Its edges lie between pixels.
   bench.surfaces.obstacles.push_back(box_between({-8 * pixel, -4 * pixel, 1.1}, {12 * pixel, 6 * pixel, 1.2}));
   for (const LensMode mode : modes) {
@@ -138,72 +149,41 @@ TEST(Lens, AnObstacleHidesTheImage) {
         const bool hidden = x >= 16 && x < 36 && y >= 10 && y < 20;
         const LensEnd end = mode == LensMode::gather ? LensEnd::obstacle : LensEnd::missed;
         ASSERT_EQ(point_at(seen, x, y).end, hidden ? end : LensEnd::image) << x << " " << y;
-        EXPECT_NEAR(seen.alpha[static_cast<std::size_t>(y * 48 + x)], hidden ? 0 : 1, 1e-6);
-        EXPECT_NEAR(seen.radiance.values[static_cast<std::size_t>(y * 48 + x)], hidden ? 0 : 0.5, 1e-6);
+        EXPECT_NEAR(seen.alpha[index_of(seen, x, y)], hidden ? 0 : 1, 1e-6);
+        EXPECT_NEAR(radiance_at(seen, x, y), hidden ? 0 : 0.5, 1e-6);
       }
     EXPECT_GT(seen.ends[0][static_cast<int>(RayEnd::obstacle)], 0u);
   }
 }
 
 TEST(Lens, SamplesOfAUniformImageHaveItsRadiance) {
-  Bench bench(cube_field(9, linear_tensor), lens_plate(1.5, {0.6, 0.4}, {24, 16}), {3, 3}, uniform(0.75f),
-              Wrap::repeat);
+  Bench bench(cube_field(9, linear_tensor), lens_plate(1.5, {0.6, 0.4}, {24, 16}), {3, 3}, uniform(0.75), Wrap::repeat);
   for (const LensMode mode : modes)
     for (const int samples : {1, 2, 3}) {
       bench.settings.samples = samples;
       const LensPicture seen = bench.simulate(mode);
-      for (std::size_t i = 0; i < seen.alpha.size(); ++i) {
-        ASSERT_NEAR(seen.radiance.values[i], 0.75, 1e-5) << samples;
-        ASSERT_NEAR(seen.alpha[i], 1, 1e-6);
-      }
+      EXPECT_THAT(seen.radiance.values, testing::Each(testing::DoubleNear(0.75, 1e-5))) << samples;
+      EXPECT_THAT(seen.alpha, testing::Each(testing::DoubleNear(1, 1e-6))) << samples;
     }
-}
-
-/// A picture of one channel in the light of equal bands of a range of flexibilities, or of single ones.
-LensPicture picture_of(const Bench& bench, LensMode mode, const std::vector<double>& flexibilities, bool range,
-                       int count) {
-  LensSettings settings = bench.settings;
-  settings.mode = mode;
-  settings.flexibilities = flexibilities;
-  settings.range = range;
-  std::vector<LensBand> bands;
-  for (int i = 0; i < count; ++i) {
-    const double begin = static_cast<double>(i) / (range ? count : count - 1), end = range ? (i + 1.0) / count : begin;
-    bands.push_back({begin, end, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
-  }
-  const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending,
-                                     {bench.receiver, bench.image, Vector3d::UnitZ()}, settings, Progress());
-  const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
-    std::fill(radiances, radiances + (last - first), rgb.x());
-  };
-  return draw_lens(light, bands, radiance, 1, true, Progress());
 }
 
 /// A few bands of a range show what many single wavelengths show together, without steps between them.
 TEST(Lens, ARangeIsAContinuumOfWavelengths) {
-  Image edge(256, 256, {"R", "G", "B"});  // White on its left side.
-  for (int y = 0; y < 256; ++y)
-    for (int x = 0; x < 128; ++x) std::fill_n(edge.pixel(x, y), 3, 1.0f);
-  Bench bench(cube_field(9,
-                         [](const Vector3d&) -> Matrix3d {
-                           Matrix3d T = Matrix3d::Zero();
-                           T(0, 2) = 1;  // Moves all light along x, by about s.
-                           return T;
-                         }),
-              lens_plate(1.5, {1, 1}, {64, 16}), {4, 4}, edge);
+  const Image edge = grey(256, [](int x, int) { return x < 128 ? 1 : 0; });
+  // The field moves all light along x, by about s.
+  Bench bench(constant_field(bends_along_z({1, 0, 0})), lens_plate(1.5, {1, 1}, {64, 16}), {4, 4}, edge);
   bench.settings.samples = 2;
   for (const LensMode mode : modes) {
     constexpr int many = 128;
     std::vector<double> each;
     for (int i = 0; i < many; ++i) each.push_back(-0.1 + 0.2 * (i + 0.5) / many);
-    const LensPicture continuum = picture_of(bench, mode, {-0.1, 0.1}, true, 8),
-                      single = picture_of(bench, mode, each, false, many);
+    const LensPicture continuum = bench.simulate(mode, {-0.1, 0.1}, true, 8),
+                      single = bench.simulate(mode, each, false, many);
     EXPECT_EQ(continuum.color.plane(0)[5], continuum.radiance.plane(0)[5]);
     int between = 0;
     for (int x = 0; x < 64; ++x) {
-      const double value = continuum.radiance.plane(0)[8 * 64 + x],
-                   step = x == 0 ? 0 : value - continuum.radiance.plane(0)[8 * 64 + x - 1];
-      EXPECT_NEAR(value, single.radiance.plane(0)[8 * 64 + x], 0.03) << x;
+      const double value = radiance_at(continuum, x, 8), step = x == 0 ? 0 : value - radiance_at(continuum, x - 1, 8);
+      EXPECT_NEAR(value, radiance_at(single, x, 8), 0.03) << x;
       EXPECT_LT(std::abs(step), 0.1) << x;
       between += value > 0.05 && value < 0.95;
     }
@@ -215,16 +195,15 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
 /// whose edge it is beyond, whatever the bands are.
 TEST(Lens, AtATearPixelsHaveTheirPartOfEachBand) {
   constexpr double least = 0.1, most = 0.3, pixel = 3.0 / 96;
-  Matrix3d T = Matrix3d::Zero();  // Light along +z turns towards +y; beside the volume it is straight.
-  T(1, 2) = 1;
-  T(2, 1) = -1;
+  Matrix3d T;  // Light along +z turns towards +y; beside the volume it is straight.
+  T << 0, 0, 0, 0, 0, 1, 0, -1, 0;
   const auto aside = [](double s) {
     const double angle = std::asin(2 * s);
     return (1 - std::cos(angle)) / s + 0.5 * std::tan(angle);
   };
   Bench bench(constant_field(T), lens_plate(1.5, {3, 3}, {96, 96}), {3, 3}, uniform(1), Wrap::clamp);
   constexpr int count = 3;
-  const LensPicture seen = picture_of(bench, LensMode::scatter, {least, most}, true, count);
+  const LensPicture seen = bench.simulate(LensMode::scatter, {least, most}, true, count);
   int partly = 0;
   for (int row = 0; row < 96; ++row) {
     const double y = 1.5 - (row + 0.5) * pixel;
@@ -234,9 +213,7 @@ TEST(Lens, AtATearPixelsHaveTheirPartOfEachBand) {
     const double expected = (low - least) / (most - least);
     // Half of an eighth of a band, and the quarter of a pixel that is lost at the edge.
     const double slope = (aside(most) - aside(least)) / pixel;
-    EXPECT_NEAR(seen.radiance.plane(0)[static_cast<std::size_t>(row * 96 + 48)], expected,
-                1.0 / (16 * count) + 0.5 / slope)
-        << row;
+    EXPECT_NEAR(radiance_at(seen, 48, row), expected, 1.0 / (16 * count) + 0.5 / slope) << row;
     partly += expected > 0.05 && expected < 0.95;
   }
   EXPECT_GT(partly, 10);
@@ -244,46 +221,32 @@ TEST(Lens, AtATearPixelsHaveTheirPartOfEachBand) {
 
 /// Where the map bends within a pixel, its samples are the mean of what smaller pixels see, in dispersed light, too.
 TEST(Lens, PixelsAreTheMeanOfTheirPartsWhereTheMapBends) {
-  Image stripes(512, 512, {"R", "G", "B"});
-  for (int y = 0; y < 512; ++y)
-    for (int x = 0; x < 512; ++x) std::fill_n(stripes.pixel(x, y), 3, y / 32 % 2 ? 1.0f : 0.0f);
-  const auto tensor = [](const Vector3d& at) -> Matrix3d {
-    Matrix3d T = Matrix3d::Zero();
-    T(0, 2) = 4;  // Dispersion along x, bends along y.
-    T(1, 2) = 6 * std::sin(9 * at.y());
-    return T;
-  };
+  const Image stripes = grey(512, [](int, int y) { return y / 32 % 2; });
+  // Dispersion along x, bends along y.
+  const auto tensor = [](const Vector3d& at) { return bends_along_z({4, 6 * std::sin(9 * at.y()), 0}); };
   constexpr int n = 4, size = 16;
   Bench coarse(cube_field(17, tensor), lens_plate(1.5, {1, 1}, {size, size}), {4, 4}, stripes);
   Bench fine(cube_field(17, tensor), lens_plate(1.5, {1, 1}, {n * size, n * size}), {4, 4}, stripes);
   coarse.settings.samples = n;
   coarse.bending = fine.bending = settings_of(BendingMethod::splitting, 0.5);
   // (Not of scatter, whose gaps at tears are a quarter of a pixel wide: they differ with the pixels.)
-  const LensPicture seen = picture_of(coarse, LensMode::gather, {0.05, 0.15}, true, 4),
-                    parts = picture_of(fine, LensMode::gather, {0.05, 0.15}, true, 4);
+  const LensPicture seen = coarse.simulate(LensMode::gather, {0.05, 0.15}, true, 4),
+                    parts = fine.simulate(LensMode::gather, {0.05, 0.15}, true, 4);
   double sum = 0;
   for (int y = 0; y < size; ++y)
     for (int x = 0; x < size; ++x) {
       double mean = 0;
-      for (int i = 0; i < n * n; ++i)
-        mean += parts.radiance.plane(0)[static_cast<std::size_t>((n * y + i / n) * n * size + n * x + i % n)];
-      sum += std::abs(seen.radiance.plane(0)[static_cast<std::size_t>(y * size + x)] - mean / (n * n));
+      for (int i = 0; i < n * n; ++i) mean += radiance_at(parts, n * x + i % n, n * y + i / n);
+      sum += std::abs(radiance_at(seen, x, y) - mean / (n * n));
     }
   EXPECT_LT(sum / (size * size), 0.01);
 }
 
 /// Display values of smooth pictures are those of rays that are traced for each pixel, to within a step of 8 bits.
 TEST(Lens, PixelsHaveTheDisplayValueOfTheirRays) {
-  Image waves(256, 256, {"R", "G", "B"});
-  for (int y = 0; y < 256; ++y)
-    for (int x = 0; x < 256; ++x)
-      std::fill_n(waves.pixel(x, y), 3, static_cast<float>(0.5 + 0.2 * std::sin(0.2 * x) + 0.2 * std::cos(0.15 * y)));
-  const auto smooth = [](const Vector3d& at) -> Matrix3d {
-    Matrix3d T = Matrix3d::Zero();
-    T(0, 2) = std::sin(2 * at.x() + at.y());
-    T(1, 2) = std::cos(1.5 * at.y() - at.z());
-    T(2, 2) = 0.3 * at.x();
-    return T;
+  const Image waves = grey(256, [](int x, int y) { return 0.5 + 0.2 * std::sin(0.2 * x) + 0.2 * std::cos(0.15 * y); });
+  const auto smooth = [](const Vector3d& at) {
+    return bends_along_z({std::sin(2 * at.x() + at.y()), std::cos(1.5 * at.y() - at.z()), 0.3 * at.x()});
   };
   const Vector2i size(96, 96);
   Bench bench(cube_field(33, smooth), lens_plate(1.5, {1, 1}, size), {3, 3}, waves);
@@ -309,8 +272,7 @@ TEST(Lens, PixelsHaveTheDisplayValueOfTheirRays) {
         }
         const Vector2d st = ((back ? landing.at : start).array() / bench.image.plane.size.array() + 0.5).matrix();
         const double expected = bench.texture.lookup(st, point.per_pixel)[0];
-        const double value = seen.radiance.plane(0)[static_cast<std::size_t>(y * size.x() + x)];
-        most = std::max(most, std::abs(display(value) - display(expected)));
+        most = std::max(most, std::abs(display(radiance_at(seen, x, y)) - display(expected)));
       }
     EXPECT_LT(most, 1.0 / 255);
   }
@@ -345,9 +307,8 @@ TEST(Lens, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
       EXPECT_GE(each.size(), 10u) << phase;
       EXPECT_TRUE(std::is_sorted(each.begin(), each.end())) << phase;
     }
-    std::uint64_t rays = 0;
-    for (const std::uint64_t count : picture.ends[0]) rays += count;
-    EXPECT_LE(rays, std::uint64_t{width * height});
+    const EndCounts& ends = picture.ends[0];
+    EXPECT_LE(std::accumulate(ends.begin(), ends.end(), std::uint64_t{0}), std::uint64_t{width * height});
     for (int y = 0; y < height; y += 100)
       EXPECT_LT((point_at(picture, 1, y).st - Vector2d(0.5, 1 - (y + 0.5) / height)).norm(), 1e-6) << y;
   }
@@ -359,7 +320,7 @@ TEST(Lens, SettingsOutOfRangeAreRefused) {
     change(bench);
     for (const LensMode mode : modes) EXPECT_THROW(bench.simulate(mode), std::invalid_argument);
   };
-  refused([](Bench& bench) { bench.channels.clear(); });
+  refused([](Bench& bench) { bench.settings.flexibilities.clear(); });
   refused([](Bench& bench) { bench.settings.samples = 0; });
   refused([](Bench& bench) { bench.settings.reference = 1.5; });
   refused([](Bench& bench) { bench.image.texture = nullptr; });
@@ -410,9 +371,7 @@ TEST(Lens, PointsDescribeTheMapFromPixelsToTheImage) {
 TensorField converging_field(double k) {
   return cube_field(9, [k](const Vector3d& p) {
     const double x = std::abs(p.x());
-    Matrix3d T = Matrix3d::Zero();
-    T(0, 2) = -k * std::copysign(x < 0.5 ? x : 1 - x, p.x());
-    return T;
+    return bends_along_z({-k * std::copysign(x < 0.5 ? x : 1 - x, p.x()), 0, 0});
   });
 }
 
@@ -460,7 +419,7 @@ TEST(Lens, ThreeSheetsBeyondTheFocus) {
       const double at = (x + 0.5) * pixel - 1.2;
       const double target = mode == LensMode::scatter ? at : (point.st.x() - 0.5) * 2.8;
       ASSERT_EQ(point.end, LensEnd::image) << x;
-      EXPECT_TRUE(std::isfinite(seen.radiance.plane(0)[5 * 60 + x]));
+      EXPECT_TRUE(std::isfinite(radiance_at(seen, x, 5)));
       const int count = scan.count(target, 0.5 * pixel);
       // In `gather` the target is the point of the picture. The map is the same one, because the planes are at equal
       // distances.

@@ -1,6 +1,5 @@
 #include "integrators/path_files/path_files.h"
 
-#include <array>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
@@ -59,34 +58,20 @@ std::string bytes_of(Number number, bool little_endian) {
 }
 
 template <class Number>
-std::string triplets(const std::vector<std::array<Number, 3>>& values, bool little_endian) {
-  std::string bytes;
-  for (const auto& triplet : values)
-    for (const Number number : triplet) bytes += bytes_of(number, little_endian);
-  return bytes;
-}
-
-template <class Number>
 void expect_read(const std::string& type, bool little_endian) {
-  const Number nan = std::numeric_limits<Number>::quiet_NaN(), inf = std::numeric_limits<Number>::infinity();
   // The header's fields in another order, one that is unknown, room before the data, and a track of a single point.
-  const std::string header = "mrtrix tracks    \r\nfile: . 100\nroi: seed a.mif\ndatatype: " + type + "\nEND\n";
-  const Temporary file("a.tck", header + std::string(100 - header.size(), ' ') +
-                                    triplets<Number>({{0, 0, 0},
-                                                      {nan, nan, nan},
-                                                      {1, 2, 3},
-                                                      {1, 2, 3},
-                                                      {1, 2, 4.5},
-                                                      {nan, nan, nan},
-                                                      {0, 0, 1},
-                                                      {0, 0, 3},
-                                                      {inf, inf, inf}},
-                                                     little_endian));
+  std::string bytes = "mrtrix tracks    \r\nfile: . 100\nroi: seed a.mif\ndatatype: " + type + "\nEND\n";
+  bytes.resize(100, ' ');
+  const Vector3d between = Vector3d::Constant(NAN), end = Vector3d::Constant(INFINITY);
+  for (const Vector3d& point : {Vector3d(0, 0, 0), between, Vector3d(1, 2, 3), Vector3d(1, 2, 3), Vector3d(1, 2, 4.5),
+                                between, Vector3d(0, 0, 1), Vector3d(0, 0, 3), end})
+    for (const double number : point) bytes += bytes_of(static_cast<Number>(number), little_endian);
+  const Temporary file("a.tck", bytes);
   const std::vector<Path> paths = read_paths(file.path());
   ASSERT_EQ(paths.size(), 2u) << type;
   ASSERT_EQ(paths[0].points.size(), 2u);
-  EXPECT_EQ(paths[0].points[1].position, Eigen::Vector3d(1, 2, 4.5));
-  EXPECT_EQ(paths[0].points[1].direction, Eigen::Vector3d(0, 0, 1));
+  EXPECT_EQ(paths[0].points[1].position, Vector3d(1, 2, 4.5));
+  EXPECT_EQ(paths[0].points[1].direction, Vector3d(0, 0, 1));
   EXPECT_EQ(paths[1].points[1].length, 2);
 }
 
@@ -139,14 +124,14 @@ TEST(PathFilesTest, EndingsAndFolders) {
 
 TEST(PathFilesTest, BareWayOfACircle) {
   // Unevenly spaced points on a circle of radius 2: tangents and curvature are of second and first order in spacing.
-  std::vector<Eigen::Vector3d> positions;
+  std::vector<Vector3d> positions;
   const auto angle = [](int i) { return 0.01 * i + 0.002 * std::sin(i); };
-  for (int i = 0; i < 100; ++i) positions.push_back(2 * Eigen::Vector3d(std::cos(angle(i)), std::sin(angle(i)), 0));
+  for (int i = 0; i < 100; ++i) positions.push_back(2 * Vector3d(std::cos(angle(i)), std::sin(angle(i)), 0));
   const PathPoints points = bare_way(positions);
   ASSERT_EQ(points.size(), 100u);
   for (int i = 0; i < 100; ++i) {
     const PathPoint& point = points[static_cast<std::size_t>(i)];
-    const Eigen::Vector3d tangent(-std::sin(angle(i)), std::cos(angle(i)), 0);
+    const Vector3d tangent(-std::sin(angle(i)), std::cos(angle(i)), 0);
     EXPECT_LE((point.direction - tangent).norm(), 1e-4) << i;
     EXPECT_LE((point.change + point.position / 4).norm(), 5e-3) << i;
     EXPECT_NEAR(point.length, 2 * (angle(i) - angle(0)), 1e-4);

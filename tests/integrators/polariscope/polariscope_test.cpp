@@ -2,7 +2,6 @@
 
 #include "integrators/polariscope/polariscope.h"
 
-#include <complex>
 #include <random>
 
 #include "base/constants.h"
@@ -29,9 +28,11 @@ double distance(const Quaterniond& a, const Quaterniond& b) {
   return std::min((a.coeffs() - b.coeffs()).norm(), (a.coeffs() + b.coeffs()).norm());
 }
 
-/// Light along −z, in frames as a receiver's; a band of no width for each wavelength.
-PolarizedLight light_along(const Vector3d& direction, const std::vector<double>& wavelengths = {550}) {
+/// Light in frames as a receiver's; a band of no width for each wavelength.
+PolarizedLight polarized_light(double strength, const std::vector<double>& wavelengths = {550},
+                               const Vector3d& direction = -Vector3d::UnitZ()) {
   PolarizedLight light;
+  light.strength = strength;
   light.direction = direction.normalized();
   light.up = upright(light.direction, Vector3d::UnitY());
   light.right = light.direction.cross(light.up);
@@ -42,7 +43,7 @@ PolarizedLight light_along(const Vector3d& direction, const std::vector<double>&
   return light;
 }
 
-Plate plate_of(const PolarizedLight& light, const Eigen::Vector2i& resolution, double size = 1) {
+Plate plate_of(const PolarizedLight& light, const Vector2i& resolution, double size = 1) {
   Plate plate;
   plate.center = 5 * light.direction;
   plate.right = light.right;
@@ -77,10 +78,9 @@ Quaterniond unitary_of(const TensorField& field, const PolarizedLight& light) {
 
 /// Principal values ±½ across z, the greater one at an angle from x towards y.
 Matrix3d plane_stress(double difference, double angle) {
-  Matrix3d T = Matrix3d::Zero();
-  T(0, 0) = difference / 2 * std::cos(2 * angle);
-  T(1, 1) = -T(0, 0);
-  T(0, 1) = T(1, 0) = difference / 2 * std::sin(2 * angle);
+  const double along = difference / 2 * std::cos(2 * angle), across = difference / 2 * std::sin(2 * angle);
+  Matrix3d T;
+  T << along, across, 0, across, -along, 0, 0, 0, 0;
   return T;
 }
 
@@ -107,7 +107,7 @@ TEST(Polariscope, ArrangementsShowAPlateAsTheirFormulasSay) {
       const double fringe = std::pow(std::sin(delta / 2), 2), brush = std::pow(std::sin(2 * axis), 2) * fringe;
       // The full-wave plate, whose fast axis is at 45°, subtracts the part of the plate along it.
       const Quaterniond tint = retarder(delta, axis) * retarder(-2 * pi, pi / 4);
-      const double through = std::pow(tint.x() * 0 + tint.y(), 2) + std::pow(tint.z(), 2);
+      const double through = std::pow(tint.y(), 2) + std::pow(tint.z(), 2);
       const std::vector<std::pair<const char*, double>> cases{{"circular", fringe},
                                                               {"circular_light", 1 - fringe},
                                                               {"plane", brush},
@@ -145,13 +145,9 @@ TEST(Polariscope, StokesParametersKnowTheSenseOfCircularLight) {
   // who faces the light sees it turn the other way.
   const Eigen::Vector4d S =
       stokes({{{ElementKind::polarizer, 0}}, {{ElementKind::polarizer, 90}}}, retarder(pi / 2, pi / 4));
-  // The plate of a quarter wave with its fast axis at −45°, along which light comes first: (1, −1) and (1, 1).
-  const std::complex<double> i(0, 1), along = std::exp(i * pi / 4.0), across = std::exp(-i * pi / 4.0);
-  const Eigen::Vector2cd jones((along + across) / 2.0, (across - along) / 2.0);
-  // E exp(iωt): the phase of w before that of u is positive where w comes first.
-  const double phase = std::arg(jones[1] / jones[0]);
-  EXPECT_NEAR(std::abs(phase), pi / 2, 1e-12);
-  EXPECT_NEAR(S[3], phase > 0 ? -1 : 1, 1e-12);
+  // Of E exp(iωt) the plate moves (1, −1), along its fast axis at −45°, by exp(iπ/4), and (1, 1) by exp(−iπ/4): of
+  // (1, 0) it makes (1, −i)/√2. w comes a quarter of a period after u.
+  EXPECT_NEAR(S[3], 1, 1e-12);
   EXPECT_NEAR(S.segment<2>(1).norm(), 0, 1e-12);
 }
 
@@ -172,8 +168,7 @@ TEST(Polariscope, AUniformPlateIsExactInEveryBand) {
   for (const double orders : {0.1, 1.0, 3.7, 11.86, 12.0})
     for (const double axis : {0.0, 0.4, 2.0}) {
       const TensorField field = constant_field(plane_stress(1, axis));
-      PolarizedLight light = light_along(-Vector3d::UnitZ(), wavelengths);
-      light.strength = pi * orders / 2;  // The cube is 2 thick.
+      const PolarizedLight light = polarized_light(pi * orders / 2, wavelengths);  // The cube is 2 thick.
       const LightRow row = row_of(field, light, plate_of(light, {1, 1}));
       for (std::size_t k = 0; k < wavelengths.size(); ++k) {
         const double delta = 2 * pi * orders * 550 / wavelengths[k];
@@ -188,9 +183,8 @@ TEST(Polariscope, AUniformPlateIsExactInEveryBand) {
 /// A coefficient that passes zero near the reference: other wavelengths are turned a million times as much.
 TEST(Polariscope, StrongDispersionLosesNoDigits) {
   const TensorField field = constant_field(plane_stress(1, 0.4));
-  PolarizedLight light = light_along(-Vector3d::UnitZ(), {550, 450});
+  PolarizedLight light = polarized_light(1e-6, {550, 450});
   light.relative = [](double wavelength) { return wavelength == 550 ? 1 : 1e6; };
-  light.strength = 1e-6;
   const LightRow row = row_of(field, light, plate_of(light, {1, 1}));
   EXPECT_LT((rotation_of(row, 0, 1) - retarder(4, 0.4).toRotationMatrix()).cwiseAbs().maxCoeff(), 1e-5);
   EXPECT_NEAR(row.points[0].retarder.phase, 4e-6, 1e-11);
@@ -201,9 +195,8 @@ TEST(Polariscope, StrongDispersionLosesNoDigits) {
 TEST(Polariscope, AWideBandIsTheMeanOfItsWavelengths) {
   const TensorField field = constant_field(plane_stress(1, 0));
   for (const double orders : {0.5, 3.0, 20.0, 60.0}) {
-    PolarizedLight light = light_along(-Vector3d::UnitZ());
+    PolarizedLight light = polarized_light(pi * orders / 2);
     light.bands[0].width = 60;
-    light.strength = pi * orders / 2;
     double mean = 0;
     constexpr int many = 20000;
     for (int i = 0; i < many; ++i) mean += std::cos(2 * pi * orders * 550 / (520 + 60 * (i + 0.5) / many)) / many;
@@ -362,9 +355,8 @@ TEST(Polariscope, ATwistedRetarderConvergesWithTheVoxels) {
     // Light along −z comes in at z = 1. Along −z, x is to the right and y up.
     const TensorField field =
         smooth_field(voxels, [&](const Vector3d& p) { return plane_stress(1, turn_of_axes * (1 - p.z()) / 2); });
-    PolarizedLight light = light_along(-Vector3d::UnitZ());
-    light.strength = d / 4;  // φ = d/2 over a length of 2.
-    errors.push_back(distance(unitary_of(field, light), twisted(d, turn_of_axes)));
+    const double strength = d / 4;  // φ = d/2 over a length of 2.
+    errors.push_back(distance(unitary_of(field, polarized_light(strength)), twisted(d, turn_of_axes)));
   }
   EXPECT_GT(errors[0] / errors[1], 8) << errors[0] << " " << errors[1];
   EXPECT_LT(errors[2], 1e-4);
@@ -387,13 +379,10 @@ TriangleMesh cylinder(double radius, int sides) {
 /// Glass with axial stress 1 − 2r²/R²: C · 2 [L − 2 (L³/3 + x² L)/R²], L = √(R² − x²).
 TEST(Polariscope, ACylinderEndsAtItsSurface) {
   constexpr double R = 0.8;
-  const TensorField field = smooth_field(17, [&](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T(1, 1) = 1 - 2 * (p.x() * p.x() + p.z() * p.z()) / (R * R);
-    return T;
+  const TensorField field = smooth_field(17, [&](const Vector3d& p) -> Matrix3d {
+    return Vector3d(0, 1 - 2 * (p.x() * p.x() + p.z() * p.z()) / (R * R), 0).asDiagonal();
   });
-  PolarizedLight light = light_along(-Vector3d::UnitZ());
-  light.strength = 0.5;
+  const PolarizedLight light = polarized_light(0.5);
   const Plate plate = plate_of(light, {64, 1}, 2);
   Surfaces surfaces;
   surfaces.cut = cylinder(R, 400);
@@ -428,9 +417,8 @@ double disc_error(int voxels) {
   Eigen::Affine3d placement = Eigen::Affine3d::Identity();
   placement.linear().diagonal() << 0.985, 0.985, 0.5;
   const TensorField field = TensorField(cube_grid({voxels, voxels, 2}, disc_stress, placement), {Interpolation::cubic});
-  PolarizedLight light = light_along(-Vector3d::UnitZ());
-  const double orders = 3;                  // At the middle: σ₁ − σ₂ = 4/π.
-  light.strength = pi * orders / (4 / pi);  // The slab is 1 thick.
+  const double orders = 3;  // At the middle, where σ₁ − σ₂ = 4/π. The slab is 1 thick.
+  const PolarizedLight light = polarized_light(pi * orders / (4 / pi));
   const Plate plate = plate_of(light, {150, 150}, 1.9);
   const PolarView view(named("circular"), light.bands, Vector3d::Ones(), false);
   double error = 0;
@@ -438,7 +426,7 @@ double disc_error(int voxels) {
     const LightRow row = row_of(field, light, plate, y);
     for (std::size_t x = 0; x < 150; ++x) {
       const Vector3d p = plate.to_world({static_cast<double>(x) + 0.5, y + 0.5});
-      const double r2 = p.x() * p.x() + p.y() * p.y();
+      const double r2 = p.head<2>().squaredNorm();
       if (r2 > 0.9 || std::abs(p.y()) > 0.7) continue;
       const double difference = 4 / pi * (1 - r2) / (std::pow(r2 + 1, 2) - 4 * p.y() * p.y());
       const double power = view.spectrum(row, x)(0);
@@ -455,28 +443,21 @@ TEST(Polariscope, ADiscUnderTwoLoadsIsTheFormulaAndConverges) {
 }
 
 TEST(Polariscope, WhatCannotMatterDoesNot) {
-  const Vector3d direction = Vector3d(0.3, -0.2, -0.9).normalized();
-  PolarizedLight light = light_along(direction);
-  light.strength = 0.5;
+  const PolarizedLight light = polarized_light(0.5, {550}, {0.3, -0.2, -0.9});
   const TensorField field = cube_field(17, linear_tensor);
   const Quaterniond expected = unitary_of(field, light);
 
-  Matrix3d more = Matrix3d::Identity() * 0.7;  // A multiple of the identity, and an antisymmetric part.
-  more(0, 1) += 0.5;
-  more(1, 0) -= 0.5;
-  more(1, 2) -= 0.8;
-  more(2, 1) += 0.8;
+  Matrix3d more;  // A multiple of the identity, and an antisymmetric part.
+  more << 0.7, 0.5, 0, -0.5, 0.7, -0.8, 0, 0.8, 0.7;
   const TensorField other = cube_field(17, [&](const Vector3d& p) -> Matrix3d { return linear_tensor(p) + more; });
   EXPECT_LT(distance(unitary_of(other, light), expected), 1e-5);
 
   // Field, light and plate turned together.
   const Eigen::Affine3d turn(Eigen::AngleAxisd(0.8, Vector3d(1, 2, -1).normalized()));
-  const TensorField turned_field = cube_field(
-      17,
-      [&](const Vector3d& p) -> Matrix3d {
-        return turn.linear() * linear_tensor(turn.inverse() * p) * turn.linear().transpose();
-      },
-      turn);
+  const auto turned_tensor = [&](const Vector3d& p) -> Matrix3d {
+    return turn.linear() * linear_tensor(turn.inverse() * p) * turn.linear().transpose();
+  };
+  const TensorField turned_field = cube_field(17, turned_tensor, turn);
   PolarizedLight turned_light = light;
   for (Vector3d* each : {&turned_light.direction, &turned_light.right, &turned_light.up, &turned_light.start})
     *each = turn.linear() * *each;
@@ -493,10 +474,9 @@ TEST(Polariscope, WhatCannotMatterDoesNot) {
 /// Samples of a pixel: its fringes' mean. Half a pixel in an obstacle is half as bright, its azimuth that of the rest.
 TEST(Polariscope, PixelsAreMeansOfTheirSamples) {
   const TensorField field = smooth_field(9, [](const Vector3d& p) { return plane_stress(2 + p.x(), 0); });
-  PolarizedLight light = light_along(-Vector3d::UnitZ());
-  light.strength = 1.3;
+  PolarizedLight light = polarized_light(1.3);
   light.samples = 4;
-  Plate plate = plate_of(light, {1, 1}, 0.5);
+  const Plate plate = plate_of(light, {1, 1}, 0.5);
   double mean = 0;
   for (int i = 0; i < 4; ++i) mean += std::cos(2 * light.strength * 2 * (2 + 0.5 * ((i + 0.5) / 4 - 0.5))) / 4;
   EXPECT_NEAR(rotation_of(row_of(field, light, plate))(1, 1), mean, 1e-5);

@@ -19,10 +19,10 @@ void expect_in_aperture(const Beam& beam, const std::vector<Vector3d>& seeds) {
   for (const Vector3d& seed : seeds) {
     const Vector3d p = seed - beam.center;
     EXPECT_NEAR(p.dot(beam.direction), 0, 1e-12);
-    const Eigen::Vector2d at(p.dot(beam.right), p.dot(beam.up));
+    const Vector2d at(p.dot(beam.right), p.dot(beam.up));
     for (std::size_t i = 0; i < beam.aperture.size(); ++i) {
-      const Eigen::Vector2d edge = beam.aperture[(i + 1) % beam.aperture.size()] - beam.aperture[i];
-      const Eigen::Vector2d to = at - beam.aperture[i];
+      const Vector2d edge = beam.aperture[(i + 1) % beam.aperture.size()] - beam.aperture[i],
+                     to = at - beam.aperture[i];
       EXPECT_GE(edge.x() * to.y() - edge.y() * to.x(), -1e-9);
     }
   }
@@ -98,6 +98,10 @@ SeedList read_text(const std::string& text) {
   return read_seeds(file.path());
 }
 
+std::string complaint(const std::string& text) {
+  return message([&] { read_text(text); });
+}
+
 TEST(SeedFiles, HoldPointsInText) {
   const SeedList seeds = read_text("# a comment\n\n1 2.5 -3e-1\n\t+4,5;6 # and another\r\n7, 8, 9");
   EXPECT_EQ(seeds.positions, (std::vector<Vector3d>{{1, 2.5, -0.3}, {4, 5, 6}, {7, 8, 9}}));
@@ -116,14 +120,13 @@ TEST(SeedFiles, LinesEndAsOnAnySystem) {
   for (const std::string end : {"\n", "\r", "\r\n"}) {
     const SeedList seeds = read_text("# text" + end + "1 2 3" + end + end + "4 5 6" + end);
     EXPECT_EQ(seeds.positions, (std::vector<Vector3d>{{1, 2, 3}, {4, 5, 6}})) << seeds.positions.size();
-    const std::string said = message([&] { read_text("1 2 3" + end + end + "4 five 6" + end); });
-    EXPECT_NE(said.find("line 3: "), std::string::npos) << said;
+    EXPECT_THAT(complaint("1 2 3" + end + end + "4 five 6" + end), HasSubstr("line 3: "));
   }
 }
 
 TEST(SeedFiles, ErrorsAreShortLines) {
   for (const std::string& word : {std::string(5000000, 'x'), std::string("a\0b\x1b[31m", 8)}) {
-    const std::string said = message([&] { read_text("1 2 3\n1 2 " + word + "\n"); });
+    const std::string said = complaint("1 2 3\n1 2 " + word + "\n");
     EXPECT_LT(said.size(), 300u);
     EXPECT_EQ(said.find('\0'), std::string::npos);
     EXPECT_EQ(said.find('\x1b'), std::string::npos);
@@ -131,21 +134,18 @@ TEST(SeedFiles, ErrorsAreShortLines) {
 }
 
 TEST(SeedFiles, SayWhichLineIsWrong) {
-  const auto complaint = [](const std::string& text) { return message([&] { read_text(text); }); };
-  const auto expect = [&](const std::string& text, const std::string& words) {
-    const std::string said = complaint(text);
-    EXPECT_NE(said.find("seeds.txt: "), std::string::npos) << said;
-    EXPECT_NE(said.find(words), std::string::npos) << said;
-  };
-  expect("1 2 3\n4 5\n", "line 2: a seed is three numbers (x y z), or six (x y z and a direction), not 2");
-  expect("1 2 3\n1 2 3 0 0 1\n", "line 2: all lines must have the same number of values: the lines above have 3");
-  expect("1 2 3\n4 five 6\n", "line 2: \"five\" is not a finite number");
-  expect("1 2 nan\n", "line 1: \"nan\" is not a finite number");
-  expect("1 2 3 0 0 0\n", "line 1: the direction has length zero");
-  expect("x y z\na b c\n", "line 2: \"a\" is not a finite number");
-  expect("x,y,z\n", "contains no seeds");
-  expect("# nothing\n", "contains no seeds");
-  EXPECT_NE(message([] { read_seeds("/nowhere/seeds.csv"); }).find("/nowhere/seeds.csv"), std::string::npos);
+  const std::pair<std::string, std::string> wrong[]{
+      {"1 2 3\n4 5\n", "line 2: a seed is three numbers (x y z), or six (x y z and a direction), not 2"},
+      {"1 2 3\n1 2 3 0 0 1\n", "line 2: all lines must have the same number of values: the lines above have 3"},
+      {"1 2 3\n4 five 6\n", "line 2: \"five\" is not a finite number"},
+      {"1 2 nan\n", "line 1: \"nan\" is not a finite number"},
+      {"1 2 3 0 0 0\n", "line 1: the direction has length zero"},
+      {"x y z\na b c\n", "line 2: \"a\" is not a finite number"},
+      {"x,y,z\n", "contains no seeds"},
+      {"# nothing\n", "contains no seeds"}};
+  for (const auto& [text, words] : wrong)
+    EXPECT_THAT(complaint(text), AllOf(HasSubstr("seeds.txt: "), HasSubstr(words))) << text;
+  EXPECT_THAT(message([] { read_seeds("/nowhere/seeds.csv"); }), HasSubstr("/nowhere/seeds.csv"));
 }
 
 /// A tensor with the trace x + 2 z.
@@ -154,9 +154,9 @@ Matrix3d traced(const Vector3d& p) { return Vector3d(p.x(), p.z(), p.z()).asDiag
 Threshold trace_from(double min, double max = 1e300) { return {Invariant::trace, min, max}; }
 
 TEST(ThresholdSeeds, AreWhereTheTensorIsWanted) {
-  const Eigen::Affine3d turned(Eigen::Translation3d(3, -1, 2) * Eigen::AngleAxisd(0.6, Vector3d(1, 2, 3).normalized()));
+  const Affine3d turned(Eigen::Translation3d(3, -1, 2) * Eigen::AngleAxisd(0.6, Vector3d(1, 2, 3).normalized()));
   for (const auto& [placement, wanted] :
-       {std::pair(Eigen::Affine3d::Identity(), trace_from(1.5, 2)), {turned, trace_from(-1e300)}}) {
+       {std::pair(Affine3d::Identity(), trace_from(1.5, 2)), {turned, trace_from(-1e300)}}) {
     const TensorField field = cube_field(9, traced, placement);
     for (const Vector3d& p : threshold_seeds(field, wanted, 500, 1)) {
       EXPECT_TRUE(field.contains(p));

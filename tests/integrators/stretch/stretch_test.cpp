@@ -24,16 +24,12 @@ double stretch_at(const TensorField& field, const StretchSettings& settings, con
                    {start})[0];
 }
 
-/// T_xz = −c x: light along −z obeys x'' = s c x near x = 0, so that a distance grows as cosh(√(s c) L) if c > 0, and
-/// oscillates if c < 0. A distance along y does not change.
-Matrix3d lens_tensor(const Vector3d& p, double c) {
-  Matrix3d T = Matrix3d::Zero();
-  T(0, 2) = -c * p.x();
-  return T;
-}
+/// T_xz = −6 x: light along −z obeys x'' = 6 s x near x = 0, so that a distance grows as cosh(√(6 s) L). A distance
+/// along y does not change.
+Matrix3d diverging(const Vector3d& p) { return Vector3d(-6 * p.x(), 0, 0) * Vector3d::UnitZ().transpose(); }
 
 TEST(Stretch, OfADivergingFieldIsThatOfTheHyperbolicCosine) {
-  const TensorField field = cube_field(17, [](const Vector3d& p) { return lens_tensor(p, 6); });
+  const TensorField field = cube_field(17, diverging);
   for (const double length : {0.3, 0.9, 1.6}) {
     const double expected = std::log(std::cosh(std::sqrt(0.5 * 6) * length)) / length;
     // The relative error of splitting is a fraction of (√3 h)²/12, h = 1/64.
@@ -43,7 +39,7 @@ TEST(Stretch, OfADivergingFieldIsThatOfTheHyperbolicCosine) {
 
 /// Behind the volume, distances grow with the difference of directions: cosh k d + k (L − d) sinh k d.
 TEST(Stretch, GoesOnBehindTheVolume) {
-  const TensorField field = cube_field(17, [](const Vector3d& p) { return lens_tensor(p, 6); });
+  const TensorField field = cube_field(17, diverging);
   const double k = std::sqrt(0.5 * 6), depth = 2, length = 5;
   // From the face where light enters, and from half a unit before it.
   for (const double before : {0.0, 0.5}) {
@@ -94,10 +90,9 @@ TEST(Stretch, IsNoneWhereLightDoesNotComeSoFar) {
 }
 
 TEST(Stretch, GridIsALatticeInTheVolume) {
-  Eigen::Affine3d placement = Eigen::Affine3d::Identity();
-  placement.translation() = Vector3d(3, 4, 5);
-  const TensorField field(cube_grid(
-      {9, 17, 5}, [](const Vector3d& p) { return lens_tensor(p - Vector3d(3, 4, 5), 6); }, placement));
+  const Vector3d center(3, 4, 5);
+  const auto tensor = [&](const Vector3d& p) { return diverging(p - center); };
+  const TensorField field(cube_grid({9, 17, 5}, tensor, Affine3d(Eigen::Translation3d(center))));
   const Geometry geometry(surfaces_of(field));
   const ScalarGrid grid = stretch_grid(field, geometry, {}, along_minus_z(0.5), 33, Progress());
   std::size_t voxels = 0;

@@ -28,29 +28,31 @@ TEST(WorkFileTest, WhatBelongsToNoRenderIsRefused) {
   EXPECT_EQ(*read.results.at("tile 1"), "all of it");
   EXPECT_EQ(read.origin, right_work().origin);
 
-  std::vector<WorkFile> wrong;
+  WorkFile wrong = right_work();
+  const auto expect_refused = [&] {
+    write_work(file, wrong);
+    EXPECT_THAT(message([&] { read_work(file); }), HasSubstr("a.shard: is damaged"))
+        << wrong.part.index << " of " << wrong.part.count << ", " << wrong.origin;
+    wrong = right_work();
+  };
   for (const WorkPart part : {WorkPart{0, 0}, {3, 3}, {0, max_shards + 1}, {0, ~std::size_t{0}}}) {
-    wrong.push_back(right_work());
-    wrong.back().part = part;
+    wrong.part = part;
+    expect_refused();
   }
   for (const char* const key : {"version", "method", "scene", "scale", "direction", "files"}) {
-    wrong.push_back(right_work());
-    wrong.back().origin.erase(key);
-    wrong.push_back(right_work());
-    wrong.back().origin[key] = nullptr;
+    wrong.origin.erase(key);
+    expect_refused();
+    wrong.origin[key] = nullptr;
+    expect_refused();
   }
   for (const Json& origin : {Json(), Json("text"), Json::array()}) {
-    wrong.push_back(right_work());
-    wrong.back().origin = origin;
+    wrong.origin = origin;
+    expect_refused();
   }
   Json deep = 1;
   for (int i = 0; i < 1000; ++i) deep = Json::array({std::move(deep)});
-  wrong.push_back(right_work());
-  wrong.back().origin["scene"]["key"] = deep;
-  for (std::size_t i = 0; i < wrong.size(); ++i) {
-    write_work(file, wrong[i]);
-    EXPECT_THAT(message([&] { read_work(file); }), ::testing::HasSubstr("a.shard: is damaged")) << i;
-  }
+  wrong.origin["scene"]["key"] = deep;
+  expect_refused();
 }
 
 /// By their hashes where both have one, else by size and time.

@@ -15,14 +15,16 @@ std::vector<std::filesystem::path> scenes_in(const char* folder) {
   return scenes;
 }
 
+std::string name_of(const testing::TestParamInfo<std::filesystem::path>& scene) { return scene.param.stem().string(); }
+
 class ExampleScene : public Pictures, public ::testing::WithParamInterface<std::filesystem::path> {
  protected:
   /// Renders the scene, whose light bends.
   Image picture(const Settings& settings) {
     const Image image = render_all(settings, {}, 0, GetParam()).linear;
-    const std::string text = read_file(GetParam());
+    const std::string text = bytes_of(GetParam());
     if (text.find("\"scale\"") == std::string::npos && text.find("\"polariscope\"") == std::string::npos) {
-      EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("the median ray turns by")));
+      EXPECT_THAT(notes_, Contains(HasSubstr("the median ray turns by")));
     }
     expect_finite(image);
     EXPECT_LT(*std::min_element(image.pixels.begin(), image.pixels.end()), 0.1f);
@@ -36,8 +38,7 @@ TEST_P(ExampleScene, RendersAndBendsLight) {
            "camera.resolution=[48,48]", "integrator.max_samples=4"});
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, ExampleScene, ::testing::ValuesIn(scenes_in("scenes")),
-                         [](const auto& scene) { return scene.param.stem().string(); });
+INSTANTIATE_TEST_SUITE_P(Scenes, ExampleScene, testing::ValuesIn(scenes_in("scenes")), name_of);
 
 double luminance(const Image& image, int x, int y) {
   const float* pixel = image.pixel(x, y);
@@ -60,28 +61,26 @@ TEST_P(WholeExample, HasNoFireflies) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, WholeExample, ::testing::ValuesIn(scenes_in("scenes/whole")),
-                         [](const auto& scene) { return scene.param.stem().string(); });
+INSTANTIATE_TEST_SUITE_P(Scenes, WholeExample, testing::ValuesIn(scenes_in("scenes/whole")), name_of);
 
 /// A picture of a point load. The plate reaches from −1.3 to 1.3 along both axes.
 class PointLoadPicture : public Pictures {
  protected:
   Image picture(const std::string& scene, const Settings& more = {}) {
-    Settings settings{"light.photons=40000", "light.wavelengths.count=16", "receiver.resolution=[130,130]",
-                      "receiver.size=[2.6,2.6]", "field.generate.resolution=49"};
-    settings.insert(settings.end(), more.begin(), more.end());
-    return render_all(settings, {}, 0, source_folder() / "scenes" / scene).linear;
+    const Settings settings{"light.photons=40000", "light.wavelengths.count=16", "receiver.resolution=[130,130]",
+                            "receiver.size=[2.6,2.6]", "field.generate.resolution=49"};
+    return render_all(joined(settings, more), {}, 0, source_folder() / "scenes" / scene).linear;
   }
 
   /// Mean colour on a ring about the picture's middle; radii in world units.
-  static Eigen::Vector3d ring(const Image& image, double from, double to) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  static Vector3d ring(const Image& image, double from, double to) {
+    Vector3d sum = Vector3d::Zero();
     int count = 0;
     for (int y = 0; y < image.height; ++y)
       for (int x = 0; x < image.width; ++x) {
         const double r = 0.02 * std::hypot(x + 0.5 - 65, y + 0.5 - 65);
         if (r < from || r >= to) continue;
-        sum += Eigen::Vector3f(image.pixel(x, y)).cast<double>();
+        sum += Vector3f(image.pixel(x, y)).cast<double>();
         ++count;
       }
     return sum / count;
@@ -93,7 +92,7 @@ TEST_F(PointLoadPicture, WithThePushThereIsADarkDiscWithARedRim) {
     const Image image = picture("point_load_photons.json", light);
     EXPECT_LT(ring(image, 0, 0.2).maxCoeff(), 0.03);
     // Red bends outwards the least. From the centre outwards red begins first, then green, then blue.
-    Eigen::Vector3d begins = Eigen::Vector3d::Zero();
+    Vector3d begins = Vector3d::Zero();
     for (int colour = 0; colour < 3; ++colour)
       for (double r = 0.02; begins[colour] == 0 && r < 1.2; r += 0.02)
         if (ring(image, r, r + 0.02)[colour] > 0.3) begins[colour] = r;

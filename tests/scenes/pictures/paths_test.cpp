@@ -39,7 +39,7 @@ TEST_F(Paths, TheSameBytesOnAnyNumberOfThreads) {
                 "integrator.min_samples=2", "integrator.noise=0.1", "integrator.seeds.kind=poisson_disk"},
                names, threads);
     std::vector<std::string> contents;
-    for (const std::string& name : names) contents.push_back(read_file(in_folder(name)));
+    for (const std::string& name : names) contents.push_back(bytes_of(in_folder(name)));
     if (one.empty()) one = contents;
     for (std::size_t i = 0; i < names.size(); ++i) EXPECT_TRUE(contents[i] == one[i]) << names[i];
   }
@@ -47,79 +47,61 @@ TEST_F(Paths, TheSameBytesOnAnyNumberOfThreads) {
 
 /// Each value of a key is another picture. A curvature is s times the transverse force: within its own range, the same.
 TEST_F(Paths, StylesColoursAndMaterialsAreDifferent) {
+  const Settings plain{transparent, without_box}, thick{"integrator.radius.typical=0.1", without_box};
   const Settings coloured{"integrator.radius.typical=0.05", "integrator.shading=headlight", without_box};
-  const Settings thick{"integrator.radius.typical=0.1", without_box};
+  const Settings styles{"tube", "wire", "ellipses", "lines"};
+  const Settings colours{"force",      "transverse_force", "curvature", "length",
+                         "wavelength", "direction",        "invariant", "none"};
+  const Settings materials{R"({"kind": "diffuse"})", R"({"kind": "principled"})",
+                           R"({"kind": "principled", "clearcoat": 1})", R"({"kind": "metal", "metal": "copper"})",
+                           R"({"kind": "glass"})"};
   struct Case {
-    std::string key;
+    std::string key, channel;
     Settings values, more;
-    std::string channel;
-    std::size_t different;
   };
   for (const Case& each :
-       {Case{"integrator.style", {"tube", "wire", "ellipses", "lines"}, {transparent, without_box}, "R", 4},
-        Case{"integrator.color.by",
-             {"force", "transverse_force", "curvature", "length", "wavelength", "direction", "invariant", "none"},
-             coloured,
-             "albedo.R",
-             7},
-        Case{"integrator.material",
-             {R"({"kind": "diffuse"})", R"({"kind": "principled"})", R"({"kind": "principled", "clearcoat": 1})",
-              R"({"kind": "metal", "metal": "copper"})", R"({"kind": "glass"})"},
-             thick,
-             "R",
-             5}}) {
+       {Case{"integrator.style", "R", styles, plain}, Case{"integrator.color.by", "albedo.R", colours, coloured},
+        Case{"integrator.material", "R", materials, thick}}) {
     std::set<std::vector<float>> pictures;
     for (const std::string& value : each.values) {
-      Settings settings = each.more;
-      settings.push_back(each.key + "=" + value);
-      const Image image = render(settings, {"out.vtp"});
+      const Image image = render(joined(each.more, {each.key + "=" + value}), {"out.vtp"});
       EXPECT_GT(covered(image), 0) << value;
       EXPECT_GE(greatest(channel(image, "path")), 3) << value;
       EXPECT_GT(greatest(channel(image, "force")), 0) << value;
       const std::string lines = value == "wavelength" ? "NumberOfLines=\"64\"" : "NumberOfLines=\"16\"";
-      EXPECT_THAT(read_file(in_folder("out.vtp")), HasSubstr(lines)) << "a path a wavelength";
+      EXPECT_THAT(bytes_of(in_folder("out.vtp")), HasSubstr(lines)) << "a path a wavelength";
       pictures.insert(channel(image, each.channel));
       if (value == "none") {
         EXPECT_NEAR(greatest(channel(image, "albedo.R")), 0.7, 0.01);
       }
     }
-    EXPECT_EQ(pictures.size(), each.different) << each.key;
+    EXPECT_EQ(pictures.size(), each.values.size() - (each.values == colours ? 1 : 0)) << each.key;
   }
 }
 
 TEST_F(Paths, SeedsOfEveryKind) {
   write("seeds.txt", "# Two points\n0 0 0\n0.3, 0.2, -0.5\n");
   for (const std::string kind : {"grid", "poisson_disk", "line", "sphere", "threshold", "file"}) {
-    std::vector<std::string> changes{"integrator.seeds.kind=" + kind, transparent, without_box};
+    Settings changes{"integrator.seeds.kind=" + kind, transparent, without_box};
     if (kind == "file") changes.emplace_back("integrator.seeds.file=seeds.txt");
     if (kind == "threshold") changes.emplace_back("integrator.seeds.above=0.5");
     const Image image = render(changes, {"out.tck"});
     EXPECT_GT(covered(image), 0) << kind;
-    const std::string tracks = read_file(in_folder("out.tck"));
-    EXPECT_NE(tracks.find(kind == "file" ? "count: 2\n" : "count: 16\n"), std::string::npos) << kind;
+    EXPECT_THAT(bytes_of(in_folder("out.tck")), HasSubstr(kind == "file" ? "count: 2\n" : "count: 16\n")) << kind;
   }
 }
 
-TEST_F(Paths, PathsOfAFileGiveTheSamePictureWithoutTracing) {
+TEST_F(Paths, FilesOfPathsNeedNoPictureAndGiveTheSameOne) {
   // A given radius does not depend on the seeds, which a file of paths does not contain.
-  const Settings settings{"integrator.radius.typical=0.04"};
-  const Image traced = render(settings, {"out.vtp", "out.ply"});
-  const std::string tubes = read_file(in_folder("out.ply")), paths = read_file(in_folder("out.vtp"));
-  std::filesystem::rename(in_folder("out.vtp"), in_folder("kept.vtp"));
-  Settings again = settings;
-  again.push_back("integrator.paths=kept.vtp");
-  EXPECT_TRUE(render(again, {"out.vtp", "out.ply"}).pixels == traced.pixels);
-  EXPECT_TRUE(read_file(in_folder("out.vtp")) == paths);
-  EXPECT_TRUE(read_file(in_folder("out.ply")) == tubes);
-}
-
-TEST_F(Paths, FilesOfPathsNeedNoPicture) {
-  render({}, {"out.vtp", "out.ply", "out.png"});
-  for (const std::string ending : {".ply", ".vtp"}) {
-    render_all({}, {"alone" + ending});
-    EXPECT_TRUE(read_file(in_folder("alone" + ending)) == read_file(in_folder("out" + ending))) << ending;
-  }
+  const std::string radius = "integrator.radius.typical=0.04";
+  const Image traced = render({radius}, {"out.vtp", "out.ply", "out.png"});
+  render_all({radius}, {"alone.ply"});
+  render_all({radius}, {"alone.vtp"});
   EXPECT_EQ(statistics_["seconds"]["draw"], 0);
+  EXPECT_TRUE(render({radius, "integrator.paths=alone.vtp"}, {"again.vtp", "again.ply"}).pixels == traced.pixels);
+  for (const std::string ending : {".ply", ".vtp"})
+    for (const std::string name : {"alone", "again"})
+      EXPECT_TRUE(bytes_of(in_folder(name + ending)) == bytes_of(in_folder("out" + ending))) << name << ending;
 }
 
 TEST_F(Paths, WhatAUserCanGetWrong) {
@@ -147,18 +129,12 @@ TEST_F(Paths, WhatAUserCanGetWrong) {
 }
 
 TEST_F(Paths, ContextIsShown) {
-  const Settings from_here{transparent, seen_from_the_side};
-  const auto with = [&](const std::string& setting) {
-    Settings settings = from_here;
-    settings.push_back(setting);
-    return render(settings);
-  };
-  const double plain = covered(render(from_here));
+  const auto with = [&](const std::string& setting) { return render({transparent, seen_from_the_side, setting}); };
+  const double plain = covered(render({transparent, seen_from_the_side}));
   EXPECT_LT(covered(with(without_box)), plain - 1);
   std::vector<Image> pictures;
-  for (const std::string& setting :
-       {std::string("integrator.context.plate=true"), std::string("integrator.context.slice={}"),
-        std::string(R"(integrator.context.isosurfaces=[{"invariant": "norm", "value": 1}])")}) {
+  for (const char* setting : {"integrator.context.plate=true", "integrator.context.slice={}",
+                              R"(integrator.context.isosurfaces=[{"invariant": "norm", "value": 1}])"}) {
     pictures.push_back(with(setting));
     const Image& image = pictures.back();
     EXPECT_GT(covered(image), plain + 4) << setting;
@@ -180,18 +156,15 @@ TEST_F(Paths, ContextIsShown) {
 }
 
 TEST_F(Paths, Backgrounds) {
-  const auto corner = [&](const std::vector<std::string>& settings) {
+  const auto corner = [&](const Settings& settings) -> Vector4f {
     const Image image = render(settings);
-    return Eigen::Vector4f(channel(image, "R")[0], channel(image, "G")[0], channel(image, "B")[0],
-                           channel(image, "A")[0]);
+    return {channel(image, "R")[0], channel(image, "G")[0], channel(image, "B")[0], channel(image, "A")[0]};
   };
-  EXPECT_LT((corner({}) - Eigen::Vector4f(1, 1, 1, 1)).norm(), 1e-4f);
-  EXPECT_LT((corner({"integrator.background_color=[0.2,0.2,0.2]"}) - Eigen::Vector4f(0.2f, 0.2f, 0.2f, 1)).norm(),
-            1e-4f);
-  EXPECT_EQ(corner({transparent}), Eigen::Vector4f(0, 0, 0, 0));
-  const Eigen::Vector4f sky =
-      corner({"integrator.background=lights", R"(lights=[{"kind": "constant", "strength": 0.3}])"});
-  EXPECT_LT((sky - Eigen::Vector4f(0.3f, 0.3f, 0.3f, 1)).norm(), 2e-3f);
+  EXPECT_LT((corner({}) - Vector4f(1, 1, 1, 1)).norm(), 1e-4f);
+  EXPECT_LT((corner({"integrator.background_color=[0.2,0.2,0.2]"}) - Vector4f(0.2f, 0.2f, 0.2f, 1)).norm(), 1e-4f);
+  EXPECT_EQ(corner({transparent}), Vector4f(0, 0, 0, 0));
+  const Vector4f sky = corner({"integrator.background=lights", R"(lights=[{"kind": "constant", "strength": 0.3}])"});
+  EXPECT_LT((sky - Vector4f(0.3f, 0.3f, 0.3f, 1)).norm(), 2e-3f);
 }
 
 TEST_F(Paths, PreviewsNeedNoLights) {

@@ -1,7 +1,7 @@
 #pragma once
 /// Renders small scenes as `tensorray render` does, in the process of the test.
 
-#include <fstream>
+#include <numeric>
 #include <optional>
 #include <regex>
 #include <stdexcept>
@@ -27,7 +27,15 @@ namespace tensorray::test {
 
 using Settings = std::vector<std::string>;
 
-inline std::string read_file(const std::filesystem::path& path) { return bytes_of(path); }
+inline Settings joined(Settings first, const Settings& more) {
+  first.insert(first.end(), more.begin(), more.end());
+  return first;
+}
+
+/// So many samples of each pixel.
+inline Settings samples(int count) {
+  return {"integrator.max_samples=" + std::to_string(count), "integrator.min_samples=" + std::to_string(count)};
+}
 
 /// The named channel of a picture, by pixel.
 inline std::vector<float> channel(const Image& image, const std::string& name) {
@@ -43,11 +51,7 @@ inline std::vector<float> channel(const Image& image, const std::string& name) {
   return values;
 }
 
-inline double sum(const std::vector<float>& values) {
-  double total = 0;
-  for (const float value : values) total += static_cast<double>(value);
-  return total;
-}
+inline double sum(const std::vector<float>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
 inline double mean(const Image& image, const std::string& name) {
   return sum(channel(image, name)) / image.width / image.height;
@@ -64,9 +68,7 @@ class Pictures : public ::testing::Test {
  protected:
   std::filesystem::path in_folder(const std::string& name) const { return folder_ / name; }
 
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream(in_folder(name), std::ios::binary) << text;
-  }
+  void write(const std::string& name, const std::string& text) const { write_bytes(in_folder(name), text); }
 
   /// Renders the scene and writes `outputs`; without any, no file.
   /// @param threads  0: all. @param scene  Relative to the folder.
@@ -81,9 +83,7 @@ class Pictures : public ::testing::Test {
     if (!outputs.empty()) files = open_outputs(description.output);
     const Scene scene = load_scene(description, Progress());
     Render result = tensorray::render(scene, Progress());
-    notes_ = scene.notes;
-    notes_.insert(notes_.end(), description.warnings.begin(), description.warnings.end());
-    notes_.insert(notes_.end(), result.warnings.begin(), result.warnings.end());
+    notes_ = joined(joined(scene.notes, description.warnings), result.warnings);
     statistics_ = nlohmann::json::parse(statistics_json(scene, result.statistics, 0, threads));
     if (!outputs.empty()) write_outputs(result, scene, files);
     commit_outputs(std::move(files));
@@ -101,19 +101,16 @@ class Pictures : public ::testing::Test {
   /// A render that must fail as wrong input (status 2) or otherwise (1), with one line that matches `pattern`.
   void expect_error(int status, const std::string& pattern, const Settings& settings, const Settings& outputs = {}) {
     int found = 0;
-    std::string line;
-    try {
-      render_all(settings, outputs);
-    } catch (const std::invalid_argument& error) {
-      found = 2;
-      line = error.what();
-    } catch (const std::exception& error) {
-      found = 1;
-      line = error.what();
-    }
+    const std::string line = message([&] {
+      try {
+        render_all(settings, outputs);
+      } catch (const std::exception& error) {
+        found = dynamic_cast<const std::invalid_argument*>(&error) ? 2 : 1;
+        throw;
+      }
+    });
     EXPECT_EQ(found, status) << line << "\nexpected " << pattern;
     EXPECT_TRUE(std::regex_search(line, std::regex(pattern))) << line << "\nexpected " << pattern;
-    EXPECT_EQ(line.find('\n'), std::string::npos) << line;
   }
 
   std::vector<std::string> notes_;  ///< Notes and warnings of the last render.
