@@ -9,7 +9,7 @@
 #include "renderer/images/image.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "tests/data_folder.h"
-#include "tests/names.h"
+#include "tests/files.h"
 #include "tests/viewer/view_support.h"
 #include "tools/viewer/stages.h"
 #include "volumes/files/tensor_files.h"
@@ -32,17 +32,19 @@ class PagesTest : public test::ViewTest {
   }
   void send(const Json& message) { pages_.receive(page_, message.dump()); }
   void send_scene(int id, const Json& scene) { pages_.receive(page_, scene_message(id, scene)); }
+  test::Received final_picture(int id, const Json& scene) {
+    send_scene(id, scene);
+    return mailbox_.final_picture(id);
+  }
 
   Image picture_of(const test::Received& message, const std::string& ending) {
-    const std::filesystem::path file = in_folder("received" + ending);
-    std::ofstream(file, std::ios::binary) << message.bytes;
-    return read_image(file);
+    write_bytes(in_folder("received" + ending), message.bytes);
+    return read_image(in_folder("received" + ending));
   }
 };
 
 TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
-  send_scene(1, test::small_scene());
-  const test::Received last = mailbox_.final_picture(1);
+  const test::Received last = final_picture(1, test::small_scene());
   std::vector<Json> pictures;
   for (const test::Received& message : mailbox_.all())
     if (message.json.at("type") == "picture") pictures.push_back(message.json);
@@ -69,10 +71,8 @@ TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
 /// Of light that is traced, the finished picture is there at once.
 TEST_F(PagesTest, ATurnedAnalyserHasNoCoarsePicture) {
   const auto first_picture = [&](int id, const Json& scene) {
-    send_scene(id, scene);
-    const Json first = mailbox_.wait("picture", id).json;
-    mailbox_.final_picture(id);
-    return first;
+    final_picture(id, scene);
+    return mailbox_.wait("picture", id).json;
   };
   Json scene = test::small_scene();
   scene["integrator"] = {{"type", "polariscope"}};
@@ -111,8 +111,7 @@ TEST_F(PagesTest, TheNewestSceneWins) {
 }
 
 TEST_F(PagesTest, TellsAboutAPixelAndTheLightThere) {
-  send_scene(1, test::small_scene());
-  mailbox_.final_picture(1);
+  final_picture(1, test::small_scene());
   // The spectrum comes with a further picture, which is made while nothing else is to be done.
   mailbox_.wait("details", 1);
   send({{"type", "look"}, {"id", 2}, {"x", 0.3}, {"y", 0.4}});
@@ -122,9 +121,9 @@ TEST_F(PagesTest, TellsAboutAPixelAndTheLightThere) {
   // Each ray ends at the place of the plate that was asked for.
   send({{"type", "space"}, {"id", 300}});
   const Json plate = mailbox_.wait("space", 300).json.at("plate");
-  const auto vector = [](const Json& json) { return Eigen::Vector3d(json[0], json[1], json[2]); };
-  const Eigen::Vector3d right = vector(plate[1]) - vector(plate[0]), up = vector(plate[3]) - vector(plate[0]);
-  const Eigen::Vector3d expected = vector(plate[3]) + 0.3 * right - 0.4 * up;
+  const auto vector = [](const Json& json) { return Vector3d(json[0], json[1], json[2]); };
+  const Vector3d right = vector(plate[1]) - vector(plate[0]), up = vector(plate[3]) - vector(plate[0]);
+  const Vector3d expected = vector(plate[3]) + 0.3 * right - 0.4 * up;
   for (const Json& ray : answer.at("rays"))
     EXPECT_LT((vector(ray.at("points").back()) - expected).norm(), 0.03 * right.norm()) << ray;
 }
@@ -136,8 +135,7 @@ TEST_F(PagesTest, APixelHasTheBandsOfItsPicture) {
   scene["camera"] = {{"resolution", {16, 16}}};
   for (const int count : {3, 12}) {
     scene["light"]["wavelengths"]["count"] = count;
-    send_scene(count, scene);
-    mailbox_.final_picture(count);
+    final_picture(count, scene);
     send({{"type", "look"}, {"id", 100 + count}, {"x", 0}, {"y", 0}});
     const Json spectrum = mailbox_.wait("look", 100 + count).json.at("spectrum");
     EXPECT_EQ(spectrum.at("nm").size(), 6u);
@@ -165,11 +163,10 @@ TEST_F(PagesTest, SavesToItsOwnFileAlone) {
 }
 
 TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
-  Json foreign = test::small_scene(), huge = foreign, unknown = foreign;
+  Json foreign = test::small_scene(), huge = foreign, unknown = foreign, field = foreign;
   foreign["obstacles"] = {{{"file", "/etc/passwd"}}};
   huge["receiver"]["resolution"] = {30000, 30000};
   unknown["ligth"] = 1;
-  Json field = test::small_scene();
   field["field"] = {{"file", "/dev/zero"}};
   int id = 10;
   for (const Json& scene : {foreign, huge, unknown, field}) {
@@ -182,8 +179,7 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
                                        R"({"type":"export","file":"../x"})", std::string(100000, '[')};
   for (const std::string& text : wrong) pages_.receive(page_, text);
   for (int i = 0; i < 1000; ++i) send({{"type", "look"}, {"id", 1000 + i}, {"x", 1e308}, {"y", -1e308}});
-  send_scene(20, test::small_scene());
-  EXPECT_TRUE(mailbox_.final_picture(20).json.at("final"));
+  final_picture(20, test::small_scene());
   std::size_t errors = 0;
   for (const test::Received& message : mailbox_.all()) errors += message.json.at("type") == "error" ? 1 : 0;
   EXPECT_GE(errors, 4 + wrong.size());
@@ -193,11 +189,9 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
 TEST_F(PagesTest, AllPagesBeginWithTheSameField) {
   Json scene = test::small_scene();
   scene["field"]["generate"]["resolution"] = 7;
-  send_scene(1, scene);
-  mailbox_.final_picture(1);
+  final_picture(1, scene);
   pages_.open(other_mailbox_.sender());
-  const Json hello = other_mailbox_.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
-  EXPECT_EQ(hello.at("field").at("voxels")[0], 12);
+  EXPECT_EQ(other_mailbox_.hello().at("field").at("voxels")[0], 12);
 }
 
 /// The field that an import made has a name that the user has never seen.
@@ -209,7 +203,7 @@ TEST_F(PagesTest, AnImportHasTheNameOfItsFile) {
   test::Mailbox mailbox;
   Pages pages(viewed, progress_);
   const Pages::Id page = pages.open(mailbox.sender());
-  const Json hello = mailbox.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
+  const Json hello = mailbox.hello();
   EXPECT_EQ(hello.at("file"), in_folder("part.vtu").string());
   EXPECT_EQ(hello.at("scene").at("field").at("file"), in_folder("part.vtu").string());
   EXPECT_EQ(hello.at("field").at("voxels")[0], 9);
@@ -241,7 +235,7 @@ TEST_F(PagesTest, RequestsWaitForTheSceneBeforeThem) {
     }
     send(message);
   }));
-  const Json answer = other_mailbox_.wait([](const Json& json) { return json.value("id", Json()) == 2; }).json;
+  const Json answer = other_mailbox_.wait({{"id", 2}}).json;
   EXPECT_EQ(answer.at("type"), "space") << answer;
 }
 
@@ -253,11 +247,9 @@ TEST_F(PagesTest, PagesDoNotDisturbEachOther) {
   send_scene(1, test::small_scene());
   const test::Received mine = mailbox_.final_picture(1), theirs = other_mailbox_.final_picture(1);
   EXPECT_NE(mine.bytes, theirs.bytes);
-  send_scene(2, test::small_scene());
-  EXPECT_EQ(mailbox_.final_picture(2).bytes, mine.bytes);
+  EXPECT_EQ(final_picture(2, test::small_scene()).bytes, mine.bytes);
   pages_.close(other);
-  send_scene(3, test::small_scene());
-  mailbox_.final_picture(3);
+  final_picture(3, test::small_scene());
 }
 
 // The page of the live view in a real browser, with a real server: tools/viewer/page/test/page_test.mjs.
@@ -268,9 +260,8 @@ class Browser : public test::ViewTest {};
 
 TEST_F(Browser, ThePageFollowsItsUser) {
   const fs::path program(TENSORRAY_VIEW_PROGRAM), page = test::source_folder() / "tools" / "viewer" / "page";
-  if (!fs::exists(program.parent_path().parent_path() / "view" / "view.js"))
-    GTEST_SKIP() << "the page is not built (tools/viewer/page/build " << program.parent_path().parent_path() / "view"
-                 << ")";
+  const fs::path built = program.parent_path().parent_path() / "view";
+  if (!fs::exists(built / "view.js")) GTEST_SKIP() << "the page is not built (tools/viewer/page/build " << built << ")";
   if (!fs::exists(page / "node_modules" / "puppeteer-core")) GTEST_SKIP() << "puppeteer-core is not installed";
   if (!runs("node --version") || !runs("chromium --version")) GTEST_SKIP() << "node or chromium is not installed";
   const std::string command = "node '" + (page / "test" / "page_test.mjs").string() + "' '" + program.string() + "' '" +
@@ -297,11 +288,16 @@ class LiveSceneTest : public test::ViewTest {
 
 TEST_F(LiveSceneTest, PicturesAfterChangesAreThoseOfANewScene) {
   LiveScene live(scene_file());
+  const auto expect_same = [&](const Json& version) {
+    LiveScene anew(scene_file());
+    EXPECT_TRUE(shown(live, version).pixels == shown(anew, version).pixels) << version;
+    EXPECT_EQ(live.scene().scale.scale, anew.scene().scale.scale) << version;
+  };
   Json scene = test::small_scene();
-  std::vector<Json> versions{scene};
+  expect_same(scene);
   const auto change = [&](const char* pointer, const Json& value) {
     scene[Json::json_pointer(pointer)] = value;
-    versions.push_back(scene);
+    expect_same(scene);
   };
   change("/output", {{"exposure", 1}});
   change("/receiver/distance", 0.7);
@@ -322,13 +318,7 @@ TEST_F(LiveSceneTest, PicturesAfterChangesAreThoseOfANewScene) {
   const Json few{{"rays", 1024}, {"passes", 1}, {"resolution", 32}};
   change("/integrator", {{"type", "scene"}, {"max_samples", 1}, {"min_samples", 1}, {"caustic", few}});
   change("/camera/direction", {1, 0, 0});
-  versions.push_back(test::small_scene());
-  for (const Json& version : versions) {
-    LiveScene anew(scene_file());
-    const Image picture = shown(live, version), expected = shown(anew, version);
-    ASSERT_EQ(picture.pixels, expected.pixels) << version;
-    EXPECT_EQ(live.scene().scale.scale, anew.scene().scale.scale);
-  }
+  expect_same(test::small_scene());
 }
 
 TEST_F(LiveSceneTest, ARecolouredPictureIsNotRenderedAgain) {

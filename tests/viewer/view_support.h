@@ -88,31 +88,25 @@ class Mailbox {
     };
   }
 
-  /// The first message that `wanted` accepts; it waits for it.
-  template <class Wanted>
-  Received wait(const Wanted& wanted) {
+  /// The first message that has these members; it waits for it.
+  Received wait(const Json& members) {
+    const auto has_them = [&](const Received& message) {
+      Json changed = message.json;
+      changed.update(members);
+      return changed == message.json;
+    };
     std::unique_lock<std::mutex> lock(mutex_);
-    Received result;
+    auto found = messages_.end();
     arrived_.wait(lock, [&] {
-      for (const Received& message : messages_)
-        if (wanted(message.json)) {
-          result = message;
-          return true;
-        }
-      return false;
+      found = std::find_if(messages_.begin(), messages_.end(), has_them);
+      return found != messages_.end();
     });
-    return result;
+    return *found;
   }
 
-  Received wait(const std::string& type, int id) {
-    return wait([&](const Json& json) { return json.value("type", "") == type && json.value("id", Json()) == id; });
-  }
-
-  Received final_picture(int id) {
-    return wait([&](const Json& json) {
-      return json.value("type", "") == "picture" && json.value("id", Json()) == id && json.value("final", false);
-    });
-  }
+  Json hello() { return wait({{"type", "hello"}}).json; }
+  Received wait(const std::string& type, int id) { return wait({{"type", type}, {"id", id}}); }
+  Received final_picture(int id) { return wait({{"type", "picture"}, {"id", id}, {"final", true}}); }
 
   std::vector<Received> all() {
     const std::lock_guard<std::mutex> lock(mutex_);
