@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
 #include <zlib.h>
 
 #include "renderer/images/formats.h"
@@ -33,6 +34,15 @@ inline std::string first_part(const std::string& bytes, double part) {
 inline std::string exr_bytes(const Image& image, const ImageMetadata& metadata = {}) {
   const std::vector<unsigned char> bytes = encode_exr(image, metadata, 1);
   return {bytes.begin(), bytes.end()};
+}
+
+/// A picture whose pixel (x, y) has this colour.
+template <class Color>
+Image image_of(int width, int height, const Color& color) {
+  Image image(width, height, {"R", "G", "B"});
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) Eigen::Vector3f::Map(image.pixel(x, y)) = color(x, y).template cast<float>();
+  return image;
 }
 
 /// The bytes of a number, or of several, each with the least significant byte first.

@@ -1,7 +1,5 @@
 #include "renderer/textures/texture.h"
 
-#include <limits>
-
 #include "renderer/color/file_colors.h"
 #include "tests/images/picture_files.h"
 #include "tests/renderer/support.h"
@@ -28,10 +26,11 @@ Vector4f color_of(const Image& image, int x, int y) {
 }
 
 Vector4f mean_of(const Image& image) {
-  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
-  for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x) sum += color_of(image, x, y).cast<double>();
-  return (sum / image.width / image.height).cast<float>();
+  const auto channels = static_cast<Eigen::Index>(image.channels.size());
+  Vector4f mean = Vector4f::Ones();
+  mean.head(channels) =
+      Eigen::MatrixXf::Map(image.pixels.data(), channels, image.width * image.height).rowwise().mean();
+  return mean;
 }
 
 double difference(const Vector4f& a, const Vector4f& b) { return (a - b).cwiseAbs().maxCoeff(); }
@@ -69,12 +68,8 @@ TEST(TextureTest, MagnifiedTexelsAreInterpolatedLinearly) {
 }
 
 TEST(TextureTest, LongFootprintsAverageAlongThemAndStaySharpAcross) {
-  Image image(512, 512, {"R", "G", "B"});  // One bright row; the second channel has stripes across it.
-  for (int y = 0; y < 512; ++y)
-    for (int x = 0; x < 512; ++x) {
-      image.pixel(x, y)[0] = y == 256;
-      image.pixel(x, y)[1] = static_cast<float>(x % 2);
-    }
+  // One bright row; the second channel has stripes across it.
+  const Image image = image_of(512, 512, [](int x, int y) { return Vector3d(y == 256, x % 2, 0); });
   const Texture texture(image, Wrap::repeat);
   for (const double length : {2.0, 5.5, 16.0, 31.0})
     for (const double x : {100.0, 100.3, 100.5}) {
@@ -89,10 +84,7 @@ TEST(TextureTest, LongFootprintsAverageAlongThemAndStaySharpAcross) {
 }
 
 TEST(TextureTest, ALinearRampStaysLinearAtEveryFootprint) {
-  Image image(640, 480, {"R", "G", "B"});
-  for (int y = 0; y < 480; ++y)
-    for (int x = 0; x < 640; ++x)
-      image.pixel(x, y)[0] = static_cast<float>(x), image.pixel(x, y)[1] = static_cast<float>(y);
+  const Image image = image_of(640, 480, [](int x, int y) { return Vector3d(x, y, 0); });
   const Texture texture(image, Wrap::clamp);
   for (double size = 0.5; size < 40; size *= 1.3)
     for (const double stretch : {1.0, 3.7}) {
@@ -106,7 +98,7 @@ TEST(TextureTest, ALinearRampStaysLinearAtEveryFootprint) {
 }
 
 TEST(TextureTest, HugeFootprintsGiveTheMean) {
-  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  const double nan = NAN, infinity = INFINITY;
   for (const Image& image :
        {noise_image(300, 200), noise_image(1, 1), noise_image(513, 2), noise_image(100, 100, {"R", "G", "B", "A"})})
     for (const Wrap wrap : every_wrap) {
@@ -147,8 +139,7 @@ TEST(TextureTest, Wraps) {
 }
 
 TEST(TextureTest, EdgesAreAsSoftAsTheFootprint) {
-  Image image(256, 256, {"R", "G", "B"});
-  std::fill(image.pixels.begin(), image.pixels.end(), 1.0f);
+  const Image image = image_of(256, 256, [](int, int) { return Vector3d(1, 1, 1); });
   const Texture texture(image, Wrap::none);
   for (const double size : {1.0, 4.0, 16.0}) {
     const Matrix2d footprint = texels(image, size, size);
@@ -213,21 +204,13 @@ TEST(TextureFileTest, FormatsOfPngAndTiff) {
   }
 }
 
-TEST(TextureFileTest, FloatsAreTakenAsTheyAre) {
-  Image image(3, 1, {"R", "G", "B", "A"});
-  image.pixels = {-2, 1e-20f, 1e20f, 1, 0.25f, 0.5f, 0.75f, 0.5f, 3, 2, std::nanf(""), 0};
-  const Temporary file("floats.exr", exr_bytes(image));
-  const Texture texture = texture_of(file);
-  EXPECT_EQ(texel_of(texture, 0), Vector4f(-2, 1e-20f, 1e20f, 1));
-  EXPECT_EQ(texel_of(texture, 1), Vector4f(0.25f, 0.5f, 0.75f, 0.5f));
-  EXPECT_EQ(texel_of(texture, 2), Vector4f(3, 2, 0, 0));  // Light with alpha 0; NaN counts as 0.
-}
-
-TEST(TextureFileTest, ChannelsOfExrAreFoundByName) {
+TEST(TextureFileTest, ChannelsOfExrAreFoundByNameAndTakenAsTheyAre) {
   const auto first = [](const std::vector<std::string>& channels, const std::vector<float>& values) {
     const Temporary file("channels.exr", exr_file({0, 0, 0, 0}, {0, 0, 0, 0}, channels, values));
     return texel_of(texture_of(file), 0);
   };
+  EXPECT_EQ(first({"A", "B", "G", "R"}, {1, 1e20f, 1e-20f, -2}), Vector4f(-2, 1e-20f, 1e20f, 1));
+  EXPECT_EQ(first({"A", "B", "G", "R"}, {0, NAN, 2, 3}), Vector4f(3, 2, 0, 0));  // Light with alpha 0; NaN counts as 0.
   EXPECT_EQ(first({"A", "B", "G", "R", "Z"}, {0.5f, 0.1f, 0.2f, 0.3f, 9}), Vector4f(0.3f, 0.2f, 0.1f, 0.5f));
   EXPECT_EQ(first({"AO", "B", "G", "N.x", "R"}, {7, 0.1f, 0.2f, 8, 0.3f}), Vector4f(0.3f, 0.2f, 0.1f, 1));
   EXPECT_EQ(first({"beauty.B", "beauty.G", "beauty.R", "depth.Z"}, {1, 2, 3, 4}), Vector4f(3, 2, 1, 1));

@@ -9,7 +9,6 @@
 #include "renderer/images/image.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "tests/data_folder.h"
-#include "tests/files.h"
 #include "tests/viewer/view_support.h"
 #include "tools/viewer/stages.h"
 #include "volumes/files/tensor_files.h"
@@ -23,19 +22,10 @@ namespace fs = std::filesystem;
 class PagesTest : public test::ViewTest {
  protected:
   Progress progress_;
-  test::Mailbox mailbox_, other_mailbox_;  // Pages' thread sends to them until Pages ends.
+  test::Mailbox page_, other_;
   Pages pages_{viewed(), progress_};
-  Pages::Id page_ = pages_.open(mailbox_.sender());
 
-  static std::string scene_message(int id, const Json& scene) {
-    return Json{{"type", "scene"}, {"id", id}, {"scene", scene}}.dump();
-  }
-  void send(const Json& message) { pages_.receive(page_, message.dump()); }
-  void send_scene(int id, const Json& scene) { pages_.receive(page_, scene_message(id, scene)); }
-  test::Received final_picture(int id, const Json& scene) {
-    send_scene(id, scene);
-    return mailbox_.final_picture(id);
-  }
+  PagesTest() { page_.open(pages_); }
 
   Image picture_of(const test::Received& message, const std::string& ending) {
     write_bytes(in_folder("received" + ending), message.bytes);
@@ -44,12 +34,10 @@ class PagesTest : public test::ViewTest {
 };
 
 TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
-  const test::Received last = final_picture(1, test::small_scene());
-  std::vector<Json> pictures;
-  for (const test::Received& message : mailbox_.all())
-    if (message.json.at("type") == "picture") pictures.push_back(message.json);
-  EXPECT_EQ(pictures.front().at("stage"), 0);
-  EXPECT_LT(pictures.front().at("width"), 64);
+  const test::Received last = page_.final_picture(1, test::small_scene());
+  const Json first = page_.wait("picture", 1).json;
+  EXPECT_EQ(first.at("stage"), 0);
+  EXPECT_LT(first.at("width"), 64);
   EXPECT_EQ(last.json.at("width"), 64);
   EXPECT_EQ(last.json.at("/chosen/field/scale"_json_pointer), 4);
 
@@ -59,8 +47,7 @@ TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
   const std::vector<unsigned char> expected_png = encode_for_screen(display_image(anew.scene(), *render, false));
   EXPECT_EQ(last.bytes, std::string(expected_png.begin(), expected_png.end()));
 
-  send({{"type", "export"}, {"id", 2}, {"file", "exr"}});
-  const test::Received file = mailbox_.wait("file", 2);
+  const test::Received file = page_.answer("file", {{"type", "export"}, {"id", 2}, {"file", "exr"}});
   EXPECT_EQ(file.json.at("name"), "scene.exr");
   write_image(in_folder("expected.exr"), render->linear);
   const Image exported = picture_of(file, ".exr"), expected = read_image(in_folder("expected.exr"));
@@ -71,8 +58,8 @@ TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
 /// Of light that is traced, the finished picture is there at once.
 TEST_F(PagesTest, ATurnedAnalyserHasNoCoarsePicture) {
   const auto first_picture = [&](int id, const Json& scene) {
-    final_picture(id, scene);
-    return mailbox_.wait("picture", id).json;
+    page_.final_picture(id, scene);
+    return page_.wait("picture", id).json;
   };
   Json scene = test::small_scene();
   scene["integrator"] = {{"type", "polariscope"}};
@@ -81,7 +68,7 @@ TEST_F(PagesTest, ATurnedAnalyserHasNoCoarsePicture) {
   const Json turned = first_picture(2, scene);
   EXPECT_EQ(turned.at("width"), 64);
   EXPECT_TRUE(turned.at("final"));
-  EXPECT_EQ(picture_of(mailbox_.final_picture(2), ".png").width, 64);
+  EXPECT_EQ(picture_of(page_.final_picture(2), ".png").width, 64);
   scene["integrator"]["samples"] = 1;  // All is traced again.
   EXPECT_LT(first_picture(3, scene).at("width"), 64);
 }
@@ -90,7 +77,7 @@ TEST_F(PagesTest, ATurnedAnalyserHasNoCoarsePicture) {
 TEST_F(PagesTest, TheNewestSceneWins) {
   std::promise<void> all_sent;
   const std::shared_future<void> is_free = all_sent.get_future().share();
-  const auto receive = other_mailbox_.sender();
+  const auto receive = other_.sender();
   const Pages::Id page = pages_.open([receive, is_free](const PageMessage& message) {
     is_free.wait();
     receive(message);
@@ -98,12 +85,12 @@ TEST_F(PagesTest, TheNewestSceneWins) {
   Json scene = test::small_scene();
   for (int id = 1; id <= 40; ++id) {
     scene["field"]["scale"] = 4 + 0.01 * id;
-    pages_.receive(page, scene_message(id, scene));
+    pages_.receive(page, test::scene_message(id, scene).dump());
   }
   all_sent.set_value();
-  EXPECT_NEAR(other_mailbox_.final_picture(40).json.at("/chosen/field/scale"_json_pointer).get<double>(), 4.4, 1e-9);
+  EXPECT_NEAR(other_.final_picture(40).json.at("/chosen/field/scale"_json_pointer).get<double>(), 4.4, 1e-9);
   std::set<int> shown;
-  for (const test::Received& message : other_mailbox_.all())
+  for (const test::Received& message : other_.all())
     if (message.json.at("type") == "picture") shown.insert(message.json.at("id").get<int>());
   // The thread had either not begun, or shows the first picture of the scene that it had.
   EXPECT_LE(shown.size(), 2u);
@@ -111,16 +98,14 @@ TEST_F(PagesTest, TheNewestSceneWins) {
 }
 
 TEST_F(PagesTest, TellsAboutAPixelAndTheLightThere) {
-  final_picture(1, test::small_scene());
+  page_.final_picture(1, test::small_scene());
   // The spectrum comes with a further picture, which is made while nothing else is to be done.
-  mailbox_.wait("details", 1);
-  send({{"type", "look"}, {"id", 2}, {"x", 0.3}, {"y", 0.4}});
-  const Json answer = mailbox_.wait("look", 2).json;
+  page_.wait("details", 1);
+  const Json answer = page_.answer("look", {{"type", "look"}, {"id", 2}, {"x", 0.3}, {"y", 0.4}}).json;
   EXPECT_EQ(answer.at("spectrum").at("nm").size(), 8u);
   ASSERT_GE(answer.at("rays").size(), 3u);
   // Each ray ends at the place of the plate that was asked for.
-  send({{"type", "space"}, {"id", 300}});
-  const Json plate = mailbox_.wait("space", 300).json.at("plate");
+  const Json plate = page_.answer("space", {{"type", "space"}, {"id", 300}}).json.at("plate");
   const auto vector = [](const Json& json) { return Vector3d(json[0], json[1], json[2]); };
   const Vector3d right = vector(plate[1]) - vector(plate[0]), up = vector(plate[3]) - vector(plate[0]);
   const Vector3d expected = vector(plate[3]) + 0.3 * right - 0.4 * up;
@@ -135,9 +120,9 @@ TEST_F(PagesTest, APixelHasTheBandsOfItsPicture) {
   scene["camera"] = {{"resolution", {16, 16}}};
   for (const int count : {3, 12}) {
     scene["light"]["wavelengths"]["count"] = count;
-    final_picture(count, scene);
-    send({{"type", "look"}, {"id", 100 + count}, {"x", 0}, {"y", 0}});
-    const Json spectrum = mailbox_.wait("look", 100 + count).json.at("spectrum");
+    page_.final_picture(count, scene);
+    const Json look{{"type", "look"}, {"id", 100 + count}, {"x", 0}, {"y", 0}};
+    const Json spectrum = page_.answer("look", look).json.at("spectrum");
     EXPECT_EQ(spectrum.at("nm").size(), 6u);
     for (const Json& value : spectrum.at("values")) EXPECT_TRUE(value >= 0 && value < 100) << value;
   }
@@ -146,20 +131,18 @@ TEST_F(PagesTest, APixelHasTheBandsOfItsPicture) {
 TEST_F(PagesTest, SavesToItsOwnFileAlone) {
   Json scene = test::small_scene();
   scene["field"]["scale"] = 7;
-  send({{"type", "save"}, {"id", 5}, {"scene", scene}});
-  EXPECT_EQ(mailbox_.wait("saved", 5).json.at("file"), in_folder("scene.view.json").string());
-  EXPECT_EQ(read_json_object(in_folder("scene.view.json")), scene);
+  const std::filesystem::path copy = in_folder("scene.view.json");
+  EXPECT_EQ(page_.answer("saved", {{"type", "save"}, {"id", 5}, {"scene", scene}}).json.at("file"), copy.string());
+  EXPECT_EQ(read_json_object(copy), scene);
   EXPECT_EQ(read_json_object(scene_file()), test::small_scene());
   Json wrong = scene;
   wrong["nonsense"] = 1;
-  send({{"type", "save"}, {"id", 6}, {"scene", wrong}});
-  mailbox_.wait("error", 6);
-  EXPECT_EQ(read_json_object(in_folder("scene.view.json")), scene);
+  page_.answer("error", {{"type", "save"}, {"id", 6}, {"scene", wrong}});
+  EXPECT_EQ(read_json_object(copy), scene);
   EXPECT_THROW(Pages({scene_file(), {}, scene_file()}, progress_), std::invalid_argument);
-  std::filesystem::remove(in_folder("scene.view.json"));
-  ASSERT_EQ(mkfifo(in_folder("scene.view.json").c_str(), 0600), 0);  // To open it would wait for a reader.
-  send({{"type", "save"}, {"id", 7}, {"scene", scene}});
-  mailbox_.wait("error", 7);
+  std::filesystem::remove(copy);
+  ASSERT_EQ(mkfifo(copy.c_str(), 0600), 0);  // To open it would wait for a reader.
+  page_.answer("error", {{"type", "save"}, {"id", 7}, {"scene", scene}});
 }
 
 TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
@@ -170,18 +153,17 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
   field["field"] = {{"file", "/dev/zero"}};
   int id = 10;
   for (const Json& scene : {foreign, huge, unknown, field}) {
-    send_scene(++id, scene);
-    const std::string text = mailbox_.wait("error", id).json.at("message");
-    EXPECT_EQ(text.find('\n'), std::string::npos);
+    const Json answer = page_.answer("error", test::scene_message(++id, scene)).json;
+    EXPECT_THAT(answer.at("message").get<std::string>(), Not(HasSubstr("\n")));
   }
   // The fuzzer `page` sends others.
   const std::vector<std::string> wrong{"{", R"({"type":"shutdown"})", R"({"type":"scene","scene":[]})",
                                        R"({"type":"export","file":"../x"})", std::string(100000, '[')};
-  for (const std::string& text : wrong) pages_.receive(page_, text);
-  for (int i = 0; i < 1000; ++i) send({{"type", "look"}, {"id", 1000 + i}, {"x", 1e308}, {"y", -1e308}});
-  final_picture(20, test::small_scene());
+  for (const std::string& text : wrong) page_.send_text(text);
+  for (int i = 0; i < 1000; ++i) page_.send({{"type", "look"}, {"id", 1000 + i}, {"x", 1e308}, {"y", -1e308}});
+  page_.final_picture(20, test::small_scene());
   std::size_t errors = 0;
-  for (const test::Received& message : mailbox_.all()) errors += message.json.at("type") == "error" ? 1 : 0;
+  for (const test::Received& message : page_.all()) errors += message.json.at("type") == "error" ? 1 : 0;
   EXPECT_GE(errors, 4 + wrong.size());
 }
 
@@ -189,67 +171,63 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
 TEST_F(PagesTest, AllPagesBeginWithTheSameField) {
   Json scene = test::small_scene();
   scene["field"]["generate"]["resolution"] = 7;
-  final_picture(1, scene);
-  pages_.open(other_mailbox_.sender());
-  EXPECT_EQ(other_mailbox_.hello().at("field").at("voxels")[0], 12);
+  page_.final_picture(1, scene);
+  other_.open(pages_);
+  EXPECT_EQ(other_.hello().at("field").at("voxels")[0], 12);
 }
 
 /// The field that an import made has a name that the user has never seen.
 TEST_F(PagesTest, AnImportHasTheNameOfItsFile) {
   write_tensor_vdb(in_folder("made.vdb"), generate(Helix{}, default_grid(Helix{}, 9)));
-  std::ofstream(in_folder("part.vtu")) << "a mesh";
-  ViewedScene viewed{in_folder("part.vtu"), {"receiver.resolution=[16,16]", "light.photons=1000"}, ""};
+  const std::filesystem::path mesh = in_folder("part.vtu");
+  write_bytes(mesh, "a mesh");
+  ViewedScene viewed{mesh, {"receiver.resolution=[16,16]", "light.photons=1000"}, ""};
   viewed.imported = in_folder("made.vdb");
-  test::Mailbox mailbox;
+  test::Mailbox page;
   Pages pages(viewed, progress_);
-  const Pages::Id page = pages.open(mailbox.sender());
-  const Json hello = mailbox.hello();
-  EXPECT_EQ(hello.at("file"), in_folder("part.vtu").string());
-  EXPECT_EQ(hello.at("scene").at("field").at("file"), in_folder("part.vtu").string());
+  page.open(pages);
+  const Json hello = page.hello(), scene = hello.at("scene");
+  EXPECT_EQ(hello.at("file"), mesh.string());
+  EXPECT_EQ(scene.at("field").at("file"), mesh.string());
   EXPECT_EQ(hello.at("field").at("voxels")[0], 9);
-  Json wrong = hello.at("scene");
+  Json wrong = scene, other = scene;
   wrong["light"]["photons"] = -1;
-  pages.receive(page, scene_message(1, wrong));
-  EXPECT_THAT(mailbox.wait("error", 1).json.at("message").get<std::string>(), HasSubstr("part.vtu"));
-  Json other = hello.at("scene");
   other["field"]["file"] = "other.vdb";
-  pages.receive(page, scene_message(4, other));
-  EXPECT_THAT(mailbox.wait("error", 4).json.at("message").get<std::string>(), HasSubstr("this view shows"));
-  pages.receive(page, scene_message(2, hello.at("scene")));
-  mailbox.final_picture(2);
-  pages.receive(page, Json{{"type", "export"}, {"id", 3}, {"file", "png"}}.dump());
-  EXPECT_EQ(mailbox.wait("file", 3).json.at("name"), "part.png");
-  for (const test::Received& message : mailbox.all())
-    EXPECT_EQ(message.json.dump().find("made.vdb"), std::string::npos) << message.json;
+  const Json of_wrong = page.answer("error", test::scene_message(1, wrong)).json;
+  EXPECT_THAT(of_wrong.at("message").get<std::string>(), HasSubstr("part.vtu"));
+  const Json of_other = page.answer("error", test::scene_message(4, other)).json;
+  EXPECT_THAT(of_other.at("message").get<std::string>(), HasSubstr("this view shows"));
+  page.final_picture(2, scene);
+  EXPECT_EQ(page.answer("file", {{"type", "export"}, {"id", 3}, {"file", "png"}}).json.at("name"), "part.png");
+  for (const test::Received& message : page.all()) EXPECT_THAT(message.json.dump(), Not(HasSubstr("made.vdb")));
 }
 
 TEST_F(PagesTest, RequestsWaitForTheSceneBeforeThem) {
   std::promise<Pages::Id> opened;
   std::future<Pages::Id> id = opened.get_future();
-  const Pages::Send send = other_mailbox_.sender();
+  const Pages::Send send = other_.sender();
   opened.set_value(pages_.open([this, &id, send](const PageMessage& message) {
     if (test::received(message).json.at("type") == "hello") {  // Its thread then looks for more requests.
       const Pages::Id page = id.get();
-      pages_.receive(page, scene_message(1, test::small_scene()));
+      pages_.receive(page, test::scene_message(1, test::small_scene()).dump());
       pages_.receive(page, Json{{"type", "space"}, {"id", 2}}.dump());
     }
     send(message);
   }));
-  const Json answer = other_mailbox_.wait({{"id", 2}}).json;
+  const Json answer = other_.wait({{"id", 2}}).json;
   EXPECT_EQ(answer.at("type"), "space") << answer;
 }
 
 TEST_F(PagesTest, PagesDoNotDisturbEachOther) {
-  const Pages::Id other = pages_.open(other_mailbox_.sender());
+  other_.open(pages_);
   Json scene = test::small_scene();
   scene["field"]["generate"]["kind"] = "two_point_load";
-  pages_.receive(other, scene_message(1, scene));
-  send_scene(1, test::small_scene());
-  const test::Received mine = mailbox_.final_picture(1), theirs = other_mailbox_.final_picture(1);
+  other_.send(test::scene_message(1, scene));
+  const test::Received mine = page_.final_picture(1, test::small_scene()), theirs = other_.final_picture(1);
   EXPECT_NE(mine.bytes, theirs.bytes);
-  EXPECT_EQ(final_picture(2, test::small_scene()).bytes, mine.bytes);
-  pages_.close(other);
-  final_picture(3, test::small_scene());
+  EXPECT_EQ(page_.final_picture(2, test::small_scene()).bytes, mine.bytes);
+  other_.close();
+  page_.final_picture(3, test::small_scene());
 }
 
 // The page of the live view in a real browser, with a real server: tools/viewer/page/test/page_test.mjs.

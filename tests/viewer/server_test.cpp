@@ -40,8 +40,7 @@ class ServerTest : public ::testing::Test {
 
   std::string own_host() const { return "127.0.0.1:" + port_; }
 
-  http::response<http::string_body> get(const std::string& path, const std::string& host,
-                                        http::verb verb = http::verb::get) {
+  auto get(const std::string& path, const std::string& host, http::verb verb = http::verb::get) {
     tcp::socket socket = connect();
     http::request<http::empty_body> request(verb, path, 11);
     request.set(http::field::host, host);

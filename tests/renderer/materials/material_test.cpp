@@ -30,19 +30,24 @@ struct Named {
   Material material;
 };
 
-/// One material of each kind, with one band.
-std::vector<Named> materials(double roughness, double reflectance) {
-  const auto named = [&](const std::string& name, const MaterialSettings& settings) {
-    return Named{name, make_material(settings, BandValues::Constant(1, reflectance))};
-  };
-  return {named("diffuse", Diffuse{}),
-          named("metal", RoughConductor{roughness, {BandValues::Zero(1), BandValues::Ones(1)}}),
-          named("glass", RoughDielectric{roughness, 1.5}),
-          named("bubble", RoughDielectric{roughness, 0.8}),
-          named("plastic", Principled{0, roughness, 0.5, 0, 0.1}),
-          named("coated plastic", Principled{0, roughness, 1, 1, 0.03}),
-          named("half metal", Principled{0.5, roughness, 0.5, 0.7, 0.6}),
-          named("coated metal", Principled{1, roughness, 0.5, 1, 0.3})};
+/// A material of each kind and roughness, with one band.
+std::vector<Named> materials(const std::vector<double>& roughnesses, double reflectance) {
+  std::vector<Named> result;
+  for (const double roughness : roughnesses) {
+    const auto add = [&](const std::string& name, const MaterialSettings& settings) {
+      const Material material = make_material(settings, BandValues::Constant(1, reflectance));
+      result.push_back({name + " of roughness " + std::to_string(roughness), material});
+    };
+    add("diffuse", Diffuse{});
+    add("metal", RoughConductor{roughness, {BandValues::Zero(1), BandValues::Ones(1)}});
+    add("glass", RoughDielectric{roughness, 1.5});
+    add("bubble", RoughDielectric{roughness, 0.8});
+    add("plastic", Principled{0, roughness, 0.5, 0, 0.1});
+    add("coated plastic", Principled{0, roughness, 1, 1, 0.03});
+    add("half metal", Principled{0.5, roughness, 0.5, 0.7, 0.6});
+    add("coated metal", Principled{1, roughness, 0.5, 1, 0.3});
+  }
+  return result;
 }
 
 ViewedMaterial viewed(const Material& material, const Vector3d& wo) {
@@ -59,8 +64,7 @@ double pdf(const Material& material, const Vector3d& wi, const Vector3d& wo) {
   return pdf(material, viewed(material, wo), material.reflectance, wi);
 }
 
-std::optional<ScatteringSample> sample(const Material& material, const Vector3d& wo, const Vector3d& u,
-                                       BandValues& weight) {
+auto sample(const Material& material, const Vector3d& wo, const Vector3d& u, BandValues& weight) {
   return sample(material, viewed(material, wo), material.reflectance, u, weight);
 }
 
@@ -77,13 +81,12 @@ Mean albedo(const Material& material, const Vector3d& wo) {
 }
 
 TEST(MaterialFurnaceTest, WhiteMaterialsReturnAllLight) {
-  for (const double roughness : {0.0, 0.15, 0.4, 0.7, 1.0})
-    for (const Named& white : materials(roughness, 1))
-      for (const double cosine : {1.0, 0.75, 0.5, 0.2, 0.03, 1e-3, -1e-3, -0.2, -0.72, -0.8, -1.0}) {
-        if (cosine < 0 && !is_glass(white.material)) continue;
-        const Mean part = albedo(white.material, direction(cosine, 1));
-        EXPECT_NEAR(part.mean(), 1, 2e-3 + 3 * part.error()) << white.name << " " << roughness << " " << cosine;
-      }
+  for (const Named& white : materials({0.0, 0.15, 0.4, 0.7, 1.0}, 1))
+    for (const double cosine : {1.0, 0.75, 0.5, 0.2, 0.03, 1e-3, -1e-3, -0.2, -0.72, -0.8, -1.0}) {
+      if (cosine < 0 && !is_glass(white.material)) continue;
+      const Mean part = albedo(white.material, direction(cosine, 1));
+      EXPECT_NEAR(part.mean(), 1, 2e-3 + 3 * part.error()) << white.name << " " << cosine;
+    }
 }
 
 TEST(MaterialFurnaceTest, SmoothMetalsReflectAsFresnelSays) {
@@ -102,24 +105,23 @@ TEST(MaterialFurnaceTest, WithoutSpecularThePrincipledMaterialIsLambert) {
 }
 
 TEST(MaterialTest, IsReciprocal) {
-  for (const double roughness : {0.3, 0.8})
-    for (const Named& any : materials(roughness, 0.7)) {
-      const auto* glass = std::get_if<DielectricScattering>(&any.material.scattering);
-      const auto index = [&](const Vector3d& w) { return glass != nullptr && w.z() < 0 ? glass->index : 1; };
-      double sum = 0;
-      for (int i = 0; i < 500; ++i) {
-        const Vector3d wi = random_direction(2 * i), wo = random_direction(2 * i + 1);
-        const double forwards = f(any.material, wi, wo) / std::pow(index(wo), 2);
-        const double backwards = f(any.material, wo, wi) / std::pow(index(wi), 2);
-        EXPECT_NEAR(forwards, backwards, 1e-9 * (forwards + backwards)) << any.name << " " << roughness;
-        sum += forwards;
-      }
-      EXPECT_GT(sum, 0) << any.name;
+  for (const Named& any : materials({0.3, 0.8}, 0.7)) {
+    const auto* glass = std::get_if<DielectricScattering>(&any.material.scattering);
+    const auto index = [&](const Vector3d& w) { return glass != nullptr && w.z() < 0 ? glass->index : 1; };
+    double sum = 0;
+    for (int i = 0; i < 500; ++i) {
+      const Vector3d wi = random_direction(2 * i), wo = random_direction(2 * i + 1);
+      const double forwards = f(any.material, wi, wo) / std::pow(index(wo), 2);
+      const double backwards = f(any.material, wo, wi) / std::pow(index(wi), 2);
+      EXPECT_NEAR(forwards, backwards, 1e-9 * (forwards + backwards)) << any.name;
+      sum += forwards;
     }
+    EXPECT_GT(sum, 0) << any.name;
+  }
 }
 
 TEST(MaterialTest, OpaqueOnesAreTheSameFromBothSides) {
-  for (const Named& any : materials(0.4, 0.7)) {
+  for (const Named& any : materials({0.4}, 0.7)) {
     if (is_glass(any.material)) continue;
     for (int i = 0; i < 50; ++i) {
       const Vector3d wi = random_direction(2 * i), wo = random_direction(2 * i + 1);
@@ -172,40 +174,38 @@ std::vector<double> bin_probabilities(const Material& material, const Vector3d& 
 
 TEST(MaterialSamplingTest, DirectionsHaveTheirDensity) {
   constexpr int samples = 20000;
-  for (const double roughness : {0.45, 1.0})
-    for (const Named& any : materials(roughness, 0.7))
-      for (const double cosine : {0.95, 0.3, -0.6}) {
-        if (any.name == "coated plastic") continue;  // Its coat has highlights that are too sharp for these bins.
-        const Vector3d wo = direction(cosine, 0.4);
-        std::vector<double> expected = bin_probabilities(any.material, wo);
-        const double total = std::accumulate(expected.begin(), expected.end(), 0.0);
-        EXPECT_LT(total, 1 + 2e-3) << any.name << " " << roughness << " " << cosine;
-        expected.push_back(std::max(0.0, 1 - total));
-        std::vector<int> counts(expected.size());
-        BandValues weight(1);
-        for (int i = 0; i < samples; ++i) {
-          const auto scattered = sample(any.material, wo, random_point(3, i), weight);
-          ++counts[scattered ? bin_of(scattered->wi) : counts.size() - 1];
-        }
-        EXPECT_LT(chi_square_score(counts, expected), 5) << any.name << " " << roughness << " " << cosine;
+  for (const Named& any : materials({0.45, 1.0}, 0.7))
+    for (const double cosine : {0.95, 0.3, -0.6}) {
+      if (any.name.find("coated plastic") == 0) continue;  // Its coat has highlights that are too sharp for these bins.
+      const Vector3d wo = direction(cosine, 0.4);
+      std::vector<double> expected = bin_probabilities(any.material, wo);
+      const double total = std::accumulate(expected.begin(), expected.end(), 0.0);
+      EXPECT_LT(total, 1 + 2e-3) << any.name << " " << cosine;
+      expected.push_back(std::max(0.0, 1 - total));
+      std::vector<int> counts(expected.size());
+      BandValues weight(1);
+      for (int i = 0; i < samples; ++i) {
+        const auto scattered = sample(any.material, wo, random_point(3, i), weight);
+        ++counts[scattered ? bin_of(scattered->wi) : counts.size() - 1];
       }
+      EXPECT_LT(chi_square_score(counts, expected), 5) << any.name << " " << cosine;
+    }
 }
 
 TEST(MaterialSamplingTest, TheWeightIsWhatItSays) {
-  for (const double roughness : {0.0, 0.3, 1.0})
-    for (const Named& any : materials(roughness, 0.7))
-      for (int i = 0; i < 200; ++i) {
-        const Vector3d wo = random_direction(i);
-        BandValues weight(1);
-        const auto scattered = sample(any.material, wo, random_point(4, i), weight);
-        EXPECT_TRUE(scattered || weight[0] == 0) << any.name;
-        if (!scattered) continue;
-        EXPECT_NEAR(scattered->wi.norm(), 1, 1e-9) << any.name;
-        EXPECT_EQ(scattered->pdf, pdf(any.material, scattered->wi, wo));
-        const double expected = f(any.material, scattered->wi, wo) * std::abs(scattered->wi.z()) / scattered->pdf;
-        EXPECT_NEAR(weight[0], expected, 1e-12 * expected) << any.name;
-        EXPECT_LT(weight[0] / scattered->refraction, 10) << any.name << " " << roughness << " " << wo.z();
-      }
+  for (const Named& any : materials({0.0, 0.3, 1.0}, 0.7))
+    for (int i = 0; i < 200; ++i) {
+      const Vector3d wo = random_direction(i);
+      BandValues weight(1);
+      const auto scattered = sample(any.material, wo, random_point(4, i), weight);
+      EXPECT_TRUE(scattered || weight[0] == 0) << any.name;
+      if (!scattered) continue;
+      EXPECT_NEAR(scattered->wi.norm(), 1, 1e-9) << any.name;
+      EXPECT_EQ(scattered->pdf, pdf(any.material, scattered->wi, wo));
+      const double expected = f(any.material, scattered->wi, wo) * std::abs(scattered->wi.z()) / scattered->pdf;
+      EXPECT_NEAR(weight[0], expected, 1e-12 * expected) << any.name;
+      EXPECT_LT(weight[0] / scattered->refraction, 10) << any.name << " " << wo.z();
+    }
 }
 
 TEST(MaterialSamplingTest, BandsDoNotMix) {
@@ -239,23 +239,22 @@ TEST(MaterialSamplingTest, ThePointsReflectanceReplacesTheMaterials) {
 
 TEST(MaterialTest, GrazingAnglesAreFinite) {
   const std::vector<double> cosines = {1, 0.5, 1e-3, 1e-8, 1e-16, 1e-200, 0, -1e-200, -1e-8, -0.5, -1};
-  for (const double roughness : {0.0, 0.5, 1.0})
-    for (const Named& any : materials(roughness, 0.7))
-      for (const double cosine_o : cosines) {
-        const Vector3d wo = direction(cosine_o, 0);
-        BandValues weight(1);
-        for (const double azimuth : {0.0, 1.0, pi})
-          for (const double cosine_i : cosines) {
-            const Vector3d wi = direction(cosine_i, azimuth);
-            const double value = f(any.material, wi, wo), density = pdf(any.material, wi, wo);
-            ASSERT_TRUE(std::isfinite(value) && value >= 0) << any.name << " " << cosine_i << " " << cosine_o;
-            ASSERT_TRUE(std::isfinite(density) && density >= 0) << any.name << " " << cosine_i << " " << cosine_o;
-          }
-        for (int i = 0; i < 50; ++i) {
-          sample(any.material, wo, random_point(6, i), weight);
-          ASSERT_TRUE(std::isfinite(weight[0]) && weight[0] >= 0) << any.name << " " << cosine_o;
+  for (const Named& any : materials({0.0, 0.5, 1.0}, 0.7))
+    for (const double cosine_o : cosines) {
+      const Vector3d wo = direction(cosine_o, 0);
+      BandValues weight(1);
+      for (const double azimuth : {0.0, 1.0, pi})
+        for (const double cosine_i : cosines) {
+          const Vector3d wi = direction(cosine_i, azimuth);
+          const double value = f(any.material, wi, wo), density = pdf(any.material, wi, wo);
+          ASSERT_TRUE(std::isfinite(value) && value >= 0) << any.name << " " << cosine_i << " " << cosine_o;
+          ASSERT_TRUE(std::isfinite(density) && density >= 0) << any.name << " " << cosine_i << " " << cosine_o;
         }
+      for (int i = 0; i < 50; ++i) {
+        sample(any.material, wo, random_point(6, i), weight);
+        ASSERT_TRUE(std::isfinite(weight[0]) && weight[0] >= 0) << any.name << " " << cosine_o;
       }
+    }
 }
 
 TEST(MicrofacetTest, DielectricFresnelHasItsClosedForms) {

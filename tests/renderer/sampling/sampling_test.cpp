@@ -26,8 +26,7 @@ double turn(double x, double y) { return std::atan2(y, x) / (2 * pi) + 0.5; }
 
 TEST(PathSampler, SingleNumbersAreStratified) {
   std::vector<int> counts(256);
-  for (std::uint32_t sample = 0; sample < 256; ++sample)
-    ++counts[static_cast<int>(PathSampler{3, 4, sample, 9}.next_1d() * 256)];
+  for (std::uint32_t i = 0; i < 256; ++i) ++counts[static_cast<int>(PathSampler{3, 4, i, 9}.next_1d() * 256)];
   EXPECT_THAT(counts, Each(1));
 }
 

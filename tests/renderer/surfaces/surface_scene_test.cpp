@@ -18,13 +18,11 @@ namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-Vector3d random_direction(int index) {
-  return square_to_sphere({random_uniform(7, index, 0), random_uniform(7, index, 1)});
-}
+Vector3d random_direction(int i) { return square_to_sphere({random_uniform(7, i, 0), random_uniform(7, i, 1)}); }
 
-Vector3d random_point(int index) {
-  return Vector3d(random_uniform(8, index, 0), random_uniform(8, index, 1), random_uniform(8, index, 2)) * 2 -
-         Vector3d::Ones();
+/// In [−1, 1]³.
+Vector3d random_point(int i) {
+  return 2 * Vector3d(random_uniform(8, i, 0), random_uniform(8, i, 1), random_uniform(8, i, 2)) - Vector3d::Ones();
 }
 
 /// Where a ray enters a box, or leaves it if it starts inside.
@@ -136,20 +134,12 @@ TEST(SurfaceSceneTest, TaperedCurvesAreCones) {
   }
 }
 
-/// A quarter of a circle of radius 1 about the origin, in the plane z = 0.
-std::vector<Vector3d> arc(int segments) {
-  std::vector<Vector3d> points;
-  for (int i = 0; i <= segments; ++i) {
-    const double angle = pi / 2 * i / segments;
-    points.emplace_back(std::cos(angle), std::sin(angle), 0);
-  }
-  return points;
-}
-
 TEST(SurfaceSceneTest, BentCurvesHaveNoGapsAndSmoothNormals) {
   const int segments = 12;
-  const SurfaceScene scene({curve(arc(segments), std::vector<float>(segments + 1, 0.05f))});
   const double bend = pi / 2 / segments;
+  std::vector<Vector3d> points;  // A quarter of a circle about the origin.
+  for (int i = 0; i <= segments; ++i) points.emplace_back(std::cos(bend * i), std::sin(bend * i), 0);
+  const SurfaceScene scene({curve(points, std::vector<float>(segments + 1, 0.05f))});
   double faceted = 0, smooth = 0, count = 0;
   for (int i = 0; i < 5000; ++i) {
     const double angle = pi / 2 * random_uniform(4, i, 0);
@@ -340,29 +330,22 @@ TriangleMesh soup(int first, std::uint32_t count, double triangle_size) {
   return mesh;
 }
 
-/// Möller and Trumbore 1997, in double precision. Sets `clear` to false if rounding to single precision may decide.
-bool meets(const TriangleMesh& mesh, std::uint32_t triangle, const Vector3d& from, const Vector3d& direction,
-           double& distance, bool& clear) {
-  const auto& [i, j, k] = mesh.triangles[triangle];
-  const Vector3d &a = mesh.vertices[i], ab = mesh.vertices[j] - a, ac = mesh.vertices[k] - a;
-  const Vector3d p = direction.cross(ac), q = (from - a).cross(ab);
-  const double determinant = ab.dot(p);
-  const double u = (from - a).dot(p) / determinant, v = direction.dot(q) / determinant;
-  const double margin = 1e-6 / std::abs(determinant);
-  const double inside = std::min({u, v, 1 - u - v});
-  distance = ac.dot(q) / determinant;
-  if (std::abs(inside) < margin) clear = false;
-  return inside >= 0;
-}
-
-/// All that a ray meets from `min_distance` on.
+/// All that a ray meets from `min_distance` on (Möller and Trumbore 1997, in double precision). Sets `clear` to false
+/// if rounding to single precision may decide.
 std::vector<TriangleHit> brute_force(const std::vector<TriangleMesh>& meshes, const Vector3d& from,
                                      const Vector3d& direction, double min_distance, bool& clear) {
   std::vector<TriangleHit> hits;
   for (std::uint32_t mesh = 0; mesh < meshes.size(); ++mesh)
     for (std::uint32_t triangle = 0; triangle < meshes[mesh].triangles.size(); ++triangle) {
-      double distance = 0;
-      if (!meets(meshes[mesh], triangle, from, direction, distance, clear)) continue;
+      const auto& [i, j, k] = meshes[mesh].triangles[triangle];
+      const auto& vertices = meshes[mesh].vertices;
+      const Vector3d &a = vertices[i], ab = vertices[j] - a, ac = vertices[k] - a;
+      const Vector3d p = direction.cross(ac), q = (from - a).cross(ab);
+      const double determinant = ab.dot(p), distance = ac.dot(q) / determinant;
+      const double u = (from - a).dot(p) / determinant, v = direction.dot(q) / determinant;
+      const double inside = std::min({u, v, 1 - u - v});
+      if (std::abs(inside) < 1e-6 / std::abs(determinant)) clear = false;
+      if (inside < 0) continue;
       if (std::abs(distance - min_distance) < 1e-4) clear = false;
       if (distance >= min_distance) hits.push_back({distance, mesh, triangle});
     }

@@ -64,10 +64,9 @@ void scale(TubePoint& point, double factor) {
   point.y *= factor;
 }
 
-/// For each edge, how often it occurs in its direction minus how often in the opposite one, and how often in total.
 /// Vertices are identified by their positions, which are equal to the last bit where caps meet sides.
 struct Edges {
-  int unbalanced = 0, not_twice = 0;
+  int open = 0;            ///< Those that do not occur just once in each direction.
   int characteristic = 0;  ///< Euler characteristic: vertices − edges + triangles.
 };
 
@@ -84,10 +83,7 @@ Edges edges_of(const TriangleMesh& mesh) {
       ++edges[{std::min(a, b), std::max(a, b)}][a < b];
     }
   Edges result;
-  for (const auto& [edge, counts] : edges) {
-    result.unbalanced += counts[0] != counts[1];
-    result.not_twice += counts[0] + counts[1] != 2;
-  }
+  for (const auto& [edge, counts] : edges) result.open += counts != std::array{1, 1};
   result.characteristic = int(numbers.size()) - int(edges.size()) + int(mesh.triangles.size());
   return result;
 }
@@ -107,8 +103,7 @@ void expect_normals_outwards(const TubeMesh& tubes) {
 
 void expect_watertight(const TubeMesh& tubes, int characteristic) {
   const Edges edges = edges_of(tubes.mesh);
-  EXPECT_EQ(edges.unbalanced, 0);
-  EXPECT_EQ(edges.not_twice, 0);
+  EXPECT_EQ(edges.open, 0);
   EXPECT_EQ(edges.characteristic, characteristic);
   expect_normals_outwards(tubes);
 }
@@ -135,7 +130,7 @@ TEST(TubeMesh, CurvedAndTwistedTubesAreWatertight) {
       expect_watertight(tubes, 2);
       EXPECT_GT(volume(tubes.mesh), 0);
     }
-  EXPECT_GT(edges_of(solid(twisted_tube(), TubeCaps::open).mesh).not_twice, 0);
+  EXPECT_GT(edges_of(solid(twisted_tube(), TubeCaps::open).mesh).open, 0);
 }
 
 TEST(TubeMesh, RoundCapsAreHalfBalls) {
@@ -238,11 +233,8 @@ TEST(TubeMesh, WiresAreHoopsAndLines) {
   expect_watertight(both, 8);
   EXPECT_LT(volume(both.mesh) - volume(hoops.mesh), 4 * 2 * pi * 1e-4);
   EXPECT_GT(volume(both.mesh) - volume(hoops.mesh), 0.8 * 4 * 2 * pi * 1e-4);
-  for (const Vector3d& p : both.mesh.vertices) {
-    const double on = std::hypot(p.x() / 0.3, p.y() / 0.2);
-    // On the tube, up to the radius of the wire and the sagitta of the polygons.
-    EXPECT_NEAR(on, 1, 0.011 / 0.2 + 0.05);
-  }
+  // On the tube, up to the radius of the wire and the sagitta of the polygons.
+  for (const Vector3d& p : both.mesh.vertices) EXPECT_NEAR(std::hypot(p.x() / 0.3, p.y() / 0.2), 1, 0.011 / 0.2 + 0.05);
   expect_normals_outwards(make_tube_mesh({twisted_tube()}, settings_of(TubeStyle::wire, TubeCaps::flat)));
 }
 
