@@ -76,26 +76,23 @@ TEST(PictureColors, PngChunksInTheirOrder) {
   const std::vector<int> grey{128, 128, 128}, red{255, 0, 0};
   const std::string of_p3 = chromaticities_chunk(p3), of_srgb = png_chunk("sRGB", std::string(1, '\0'));
   const std::string code_points = png_chunk("cICP", std::string("\x0c\x0d\0\1", 4));
-  struct Case {
-    std::string chunks;
-    std::vector<int> rgb;
-    Vector3d expected;
-  };
-  for (const Case& each : std::vector<Case>{{"", grey, srgb},
-                                            {gamma_chunk(1), grey, linear},
-                                            {gamma_chunk(0.5), grey, Vector3d::Constant(half * half)},
-                                            {gamma_chunk(0.45455), grey, srgb},
-                                            {of_srgb + gamma_chunk(1), grey, srgb},
-                                            {of_p3, red, p3_red},
-                                            {of_p3, grey, srgb},
-                                            {of_p3 + gamma_chunk(1), {128, 0, 0}, half * p3_red},
-                                            {of_srgb + of_p3, red, Vector3d(1, 0, 0)},
-                                            {profile_chunk(p3_profile()), red, p3_red},
-                                            {profile_chunk(p3_profile()) + of_p3, grey, srgb},
-                                            {code_points + of_srgb, red, p3_red}}) {
+  using Case = std::tuple<std::string, std::vector<int>, Vector3d>;
+  for (const auto& [chunks, rgb, expected] :
+       std::vector<Case>{{"", grey, srgb},
+                         {gamma_chunk(1), grey, linear},
+                         {gamma_chunk(0.5), grey, Vector3d::Constant(half * half)},
+                         {gamma_chunk(0.45455), grey, srgb},
+                         {of_srgb + gamma_chunk(1), grey, srgb},
+                         {of_p3, red, p3_red},
+                         {of_p3, grey, srgb},
+                         {of_p3 + gamma_chunk(1), {128, 0, 0}, half * p3_red},
+                         {of_srgb + of_p3, red, Vector3d(1, 0, 0)},
+                         {profile_chunk(p3_profile()), red, p3_red},
+                         {profile_chunk(p3_profile()) + of_p3, grey, srgb},
+                         {code_points + of_srgb, red, p3_red}}) {
     std::vector<std::string> notes;
-    const Vector3d light = light_of("a.png", png_with(each.chunks, each.rgb), "", &notes);
-    EXPECT_LT((light - each.expected).cwiseAbs().maxCoeff(), 4e-4) << each.chunks << "\n" << light.transpose();
+    const Vector3d light = light_of("a.png", png_with(chunks, rgb), "", &notes);
+    EXPECT_LT((light - expected).cwiseAbs().maxCoeff(), 4e-4) << chunks << "\n" << light.transpose();
     EXPECT_THAT(notes, IsEmpty());
   }
 }
@@ -176,12 +173,8 @@ TEST(IccProfileTest, OfTablesAreRead) {
 
 TEST(PictureColors, ChromaticitiesOfExr) {
   const std::string acescg = "0.713 0.293 0.165 0.83 0.128 0.044 0.32168 0.33767";
-  struct Case {
-    Vector3f rgb;
-    std::string chromaticities;
-    Vector3d expected;
-  };
-  for (const Case& each :
+  using Case = std::tuple<Vector3f, std::string, Vector3d>;
+  for (const auto& [rgb, chromaticities, expected] :
        std::vector<Case>{{{0.2f, 0.5f, 4}, "", {0.2, 0.5, 4}},
                          {{0.2f, 0.5f, 4}, "0.64 0.33 0.3 0.6 0.15 0.06 0.3127 0.329", {0.2, 0.5, 4}},
                          {{0.95046f, 1, 1.08906f}, "1 0 0 1 0 0 0.333333 0.333333", {1, 1, 1}},  // D65.
@@ -189,11 +182,11 @@ TEST(PictureColors, ChromaticitiesOfExr) {
                          {{1, 0, 0}, acescg, {1.70505, -0.13026, -0.02400}},
                          {{1, 0, 0}, "0.68 0.32 0.265 0.69 0.15 0.06 0.3127 0.329", p3_red}}) {
     Image image(1, 1, {"R", "G", "B"});
-    Vector3f::Map(image.pixel(0, 0)) = each.rgb;
+    Vector3f::Map(image.pixel(0, 0)) = rgb;
     ImageMetadata metadata;
-    if (!each.chromaticities.empty()) metadata["chromaticities"] = each.chromaticities;
+    if (!chromaticities.empty()) metadata["chromaticities"] = chromaticities;
     const Vector3d light = light_of("a.exr", exr_bytes(image, metadata));
-    EXPECT_LT((light - each.expected).cwiseAbs().maxCoeff(), 3e-4) << each.chromaticities << ": " << light.transpose();
+    EXPECT_LT((light - expected).cwiseAbs().maxCoeff(), 3e-4) << chromaticities << ": " << light.transpose();
   }
 }
 

@@ -24,6 +24,7 @@ class PagesTest : public test::ViewTest {
   Progress progress_;
   test::Mailbox page_, other_;
   Pages pages_{viewed(), progress_};
+  Json scene_ = test::small_scene();
 
   PagesTest() { page_.open(pages_); }
 
@@ -61,16 +62,15 @@ TEST_F(PagesTest, ATurnedAnalyserHasNoCoarsePicture) {
     page_.final_picture(id, scene);
     return page_.wait("picture", id).json;
   };
-  Json scene = test::small_scene();
-  scene["integrator"] = {{"type", "polariscope"}};
-  EXPECT_LT(first_picture(1, scene).at("width"), 64);
-  scene["integrator"]["analyzer"] = 10;
-  const Json turned = first_picture(2, scene);
+  scene_["integrator"] = {{"type", "polariscope"}};
+  EXPECT_LT(first_picture(1, scene_).at("width"), 64);
+  scene_["integrator"]["analyzer"] = 10;
+  const Json turned = first_picture(2, scene_);
   EXPECT_EQ(turned.at("width"), 64);
   EXPECT_TRUE(turned.at("final"));
   EXPECT_EQ(picture_of(page_.final_picture(2), ".png").width, 64);
-  scene["integrator"]["samples"] = 1;  // All is traced again.
-  EXPECT_LT(first_picture(3, scene).at("width"), 64);
+  scene_["integrator"]["samples"] = 1;  // All is traced again.
+  EXPECT_LT(first_picture(3, scene_).at("width"), 64);
 }
 
 /// Scenes that come while the page's thread is busy: here, while it sends its first message.
@@ -82,10 +82,9 @@ TEST_F(PagesTest, TheNewestSceneWins) {
     is_free.wait();
     receive(message);
   });
-  Json scene = test::small_scene();
   for (int id = 1; id <= 40; ++id) {
-    scene["field"]["scale"] = 4 + 0.01 * id;
-    pages_.receive(page, test::scene_message(id, scene).dump());
+    scene_["field"]["scale"] = 4 + 0.01 * id;
+    pages_.receive(page, test::scene_message(id, scene_).dump());
   }
   all_sent.set_value();
   EXPECT_NEAR(other_.final_picture(40).json.at("/chosen/field/scale"_json_pointer).get<double>(), 4.4, 1e-9);
@@ -115,12 +114,11 @@ TEST_F(PagesTest, TellsAboutAPixelAndTheLightThere) {
 
 /// A picture of a camera has bands of its own, fewer than the light has or more.
 TEST_F(PagesTest, APixelHasTheBandsOfItsPicture) {
-  Json scene = test::small_scene();
-  scene["integrator"] = {{"type", "path_tracing"}, {"bands", 6}, {"max_samples", 1}, {"min_samples", 1}};
-  scene["camera"] = {{"resolution", {16, 16}}};
+  scene_["integrator"] = {{"type", "path_tracing"}, {"bands", 6}, {"max_samples", 1}, {"min_samples", 1}};
+  scene_["camera"] = {{"resolution", {16, 16}}};
   for (const int count : {3, 12}) {
-    scene["light"]["wavelengths"]["count"] = count;
-    page_.final_picture(count, scene);
+    scene_["light"]["wavelengths"]["count"] = count;
+    page_.final_picture(count, scene_);
     const Json look{{"type", "look"}, {"id", 100 + count}, {"x", 0}, {"y", 0}};
     const Json spectrum = page_.answer("look", look).json.at("spectrum");
     EXPECT_EQ(spectrum.at("nm").size(), 6u);
@@ -129,24 +127,23 @@ TEST_F(PagesTest, APixelHasTheBandsOfItsPicture) {
 }
 
 TEST_F(PagesTest, SavesToItsOwnFileAlone) {
-  Json scene = test::small_scene();
-  scene["field"]["scale"] = 7;
+  scene_["field"]["scale"] = 7;
   const std::filesystem::path copy = in_folder("scene.view.json");
-  EXPECT_EQ(page_.answer("saved", {{"type", "save"}, {"id", 5}, {"scene", scene}}).json.at("file"), copy.string());
-  EXPECT_EQ(read_json_object(copy), scene);
+  EXPECT_EQ(page_.answer("saved", {{"type", "save"}, {"id", 5}, {"scene", scene_}}).json.at("file"), copy.string());
+  EXPECT_EQ(read_json_object(copy), scene_);
   EXPECT_EQ(read_json_object(scene_file()), test::small_scene());
-  Json wrong = scene;
+  Json wrong = scene_;
   wrong["nonsense"] = 1;
   page_.answer("error", {{"type", "save"}, {"id", 6}, {"scene", wrong}});
-  EXPECT_EQ(read_json_object(copy), scene);
+  EXPECT_EQ(read_json_object(copy), scene_);
   EXPECT_THROW(Pages({scene_file(), {}, scene_file()}, progress_), std::invalid_argument);
   std::filesystem::remove(copy);
   ASSERT_EQ(mkfifo(copy.c_str(), 0600), 0);  // To open it would wait for a reader.
-  page_.answer("error", {{"type", "save"}, {"id", 7}, {"scene", scene}});
+  page_.answer("error", {{"type", "save"}, {"id", 7}, {"scene", scene_}});
 }
 
 TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
-  Json foreign = test::small_scene(), huge = foreign, unknown = foreign, field = foreign;
+  Json foreign = scene_, huge = foreign, unknown = foreign, field = foreign;
   foreign["obstacles"] = {{{"file", "/etc/passwd"}}};
   huge["receiver"]["resolution"] = {30000, 30000};
   unknown["ligth"] = 1;
@@ -169,9 +166,8 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
 
 /// A page that comes while another one looks at another field.
 TEST_F(PagesTest, AllPagesBeginWithTheSameField) {
-  Json scene = test::small_scene();
-  scene["field"]["generate"]["resolution"] = 7;
-  page_.final_picture(1, scene);
+  scene_["field"]["generate"]["resolution"] = 7;
+  page_.final_picture(1, scene_);
   other_.open(pages_);
   EXPECT_EQ(other_.hello().at("field").at("voxels")[0], 12);
 }
@@ -220,9 +216,8 @@ TEST_F(PagesTest, RequestsWaitForTheSceneBeforeThem) {
 
 TEST_F(PagesTest, PagesDoNotDisturbEachOther) {
   other_.open(pages_);
-  Json scene = test::small_scene();
-  scene["field"]["generate"]["kind"] = "two_point_load";
-  other_.send(test::scene_message(1, scene));
+  scene_["field"]["generate"]["kind"] = "two_point_load";
+  other_.send(test::scene_message(1, scene_));
   const test::Received mine = page_.final_picture(1, test::small_scene()), theirs = other_.final_picture(1);
   EXPECT_NE(mine.bytes, theirs.bytes);
   EXPECT_EQ(page_.final_picture(2, test::small_scene()).bytes, mine.bytes);
@@ -253,29 +248,25 @@ class LiveSceneTest : public test::ViewTest {
  protected:
   std::vector<std::filesystem::path> outputs_{in_folder("p.png"), in_folder("p.exr")};
   Progress progress_;
+  LiveScene live_{scene_file()};
+  Json scene_ = test::small_scene();
 
   Image shown(LiveScene& live, const Json& scene) {
     live.load(scene, outputs_, progress_);
     return display_image(live.scene(), *live.render(progress_), false);
   }
-  Image shown_anew(const Json& scene) {
+  void expect_as_anew(const Json& scene) {
     LiveScene anew(scene_file());
-    return shown(anew, scene);
+    EXPECT_TRUE(shown(live_, scene).pixels == shown(anew, scene).pixels) << scene;
+    EXPECT_EQ(live_.scene().scale.scale, anew.scene().scale.scale) << scene;
   }
 };
 
 TEST_F(LiveSceneTest, PicturesAfterChangesAreThoseOfANewScene) {
-  LiveScene live(scene_file());
-  const auto expect_same = [&](const Json& version) {
-    LiveScene anew(scene_file());
-    EXPECT_TRUE(shown(live, version).pixels == shown(anew, version).pixels) << version;
-    EXPECT_EQ(live.scene().scale.scale, anew.scene().scale.scale) << version;
-  };
-  Json scene = test::small_scene();
-  expect_same(scene);
+  expect_as_anew(scene_);
   const auto change = [&](const char* pointer, const Json& value) {
-    scene[Json::json_pointer(pointer)] = value;
-    expect_same(scene);
+    scene_[Json::json_pointer(pointer)] = value;
+    expect_as_anew(scene_);
   };
   change("/output", {{"exposure", 1}});
   change("/receiver/distance", 0.7);
@@ -296,62 +287,56 @@ TEST_F(LiveSceneTest, PicturesAfterChangesAreThoseOfANewScene) {
   const Json few{{"rays", 1024}, {"passes", 1}, {"resolution", 32}};
   change("/integrator", {{"type", "scene"}, {"max_samples", 1}, {"min_samples", 1}, {"caustic", few}});
   change("/camera/direction", {1, 0, 0});
-  expect_same(test::small_scene());
+  expect_as_anew(test::small_scene());
 }
 
 TEST_F(LiveSceneTest, ARecolouredPictureIsNotRenderedAgain) {
-  LiveScene live(scene_file());
-  Json scene = test::small_scene();
-  shown(live, scene);
-  const auto render = live.render(progress_);
-  scene["output"]["exposure"] = 2;
-  EXPECT_TRUE(live.has_picture(scene, outputs_));
-  live.load(scene, outputs_, progress_);
-  EXPECT_EQ(live.render(progress_), render);
-  scene["receiver"]["distance"] = 0.5;
-  EXPECT_FALSE(live.has_picture(scene, outputs_));
-  live.load(scene, outputs_, progress_);
-  EXPECT_NE(live.render(progress_), render);
+  shown(live_, scene_);
+  const auto render = live_.render(progress_);
+  scene_["output"]["exposure"] = 2;
+  EXPECT_TRUE(live_.has_picture(scene_, outputs_));
+  live_.load(scene_, outputs_, progress_);
+  EXPECT_EQ(live_.render(progress_), render);
+  scene_["receiver"]["distance"] = 0.5;
+  EXPECT_FALSE(live_.has_picture(scene_, outputs_));
+  live_.load(scene_, outputs_, progress_);
+  EXPECT_NE(live_.render(progress_), render);
 }
 
 TEST_F(LiveSceneTest, StaysAsItWasWhereASceneIsWrong) {
-  LiveScene live(scene_file());
-  Json scene = test::small_scene();
-  const Image before = shown(live, scene);
-  const float* const voxels = live.scene().field.brick({0, 0, 0}).bending;
-  Json wrong = scene;
+  const Image before = shown(live_, scene_);
+  const float* const voxels = live_.scene().field.brick({0, 0, 0}).bending;
+  Json wrong = scene_;
   wrong["receiver"]["size"] = {1e30, 1};
-  EXPECT_THROW(live.load(wrong, outputs_, progress_), SceneError);
+  EXPECT_THROW(live_.load(wrong, outputs_, progress_), SceneError);
   wrong["receiver"] = {{"unknown", 1}};
-  EXPECT_THROW(live.load(wrong, outputs_, progress_), SceneError);
+  EXPECT_THROW(live_.load(wrong, outputs_, progress_), SceneError);
   // With another field, loading begins anew.
-  wrong = scene;
+  wrong = scene_;
   wrong["field"] = {{"file", "missing.vdb"}};
-  EXPECT_THROW(live.load(wrong, outputs_, progress_), std::runtime_error);
-  EXPECT_EQ(live.scene().field.brick({0, 0, 0}).bending, voxels);
-  EXPECT_TRUE(live.has_picture(scene, outputs_));
+  EXPECT_THROW(live_.load(wrong, outputs_, progress_), std::runtime_error);
+  EXPECT_EQ(live_.scene().field.brick({0, 0, 0}).bending, voxels);
+  EXPECT_TRUE(live_.has_picture(scene_, outputs_));
   wrong["field"] = {{"generate", {{"kind", "vortex"}, {"resolution", 12}}}, {"scale", "auto"}};
   progress_.cancelled = true;
-  EXPECT_THROW(live.load(wrong, outputs_, progress_), Cancelled);
+  EXPECT_THROW(live_.load(wrong, outputs_, progress_), Cancelled);
   progress_.cancelled = false;
-  EXPECT_EQ(shown(live, scene).pixels, before.pixels);
-  EXPECT_EQ(live.scene().field.brick({0, 0, 0}).bending, voxels);
+  EXPECT_EQ(shown(live_, scene_).pixels, before.pixels);
+  EXPECT_EQ(live_.scene().field.brick({0, 0, 0}).bending, voxels);
 }
 
 TEST_F(LiveSceneTest, ThePolariscopeTracesOnceForAllArrangements) {
-  LiveScene live(scene_file());
-  Json scene = test::small_scene();
-  scene["integrator"] = {{"type", "polariscope"}};
-  shown(live, scene);
-  const auto kept = live.scene().kept;
+  scene_["integrator"] = {{"type", "polariscope"}};
+  shown(live_, scene_);
+  const auto kept = live_.scene().kept;
   for (const double angle : {10.0, 40.0}) {
-    scene["integrator"]["analyzer"] = angle;
-    EXPECT_EQ(shown(live, scene).pixels, shown_anew(scene).pixels) << angle;
-    EXPECT_EQ(live.scene().kept, kept);
+    scene_["integrator"]["analyzer"] = angle;
+    expect_as_anew(scene_);
+    EXPECT_EQ(live_.scene().kept, kept);
   }
-  scene["field"]["generate"]["resolution"] = 9;
-  EXPECT_EQ(shown(live, scene).pixels, shown_anew(scene).pixels);
-  EXPECT_NE(live.scene().kept, kept);
+  scene_["field"]["generate"]["resolution"] = 9;
+  expect_as_anew(scene_);
+  EXPECT_NE(live_.scene().kept, kept);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "renderer/meshes/mesh.h"
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <stdexcept>
@@ -265,14 +266,10 @@ std::string replaced(std::string text, const std::string& part, const std::strin
 }
 
 TEST(ReadMeshTest, BadFilesAreOneClearLine) {
-  const std::string garbage = "no mesh at all\n\x01\x02\x03 v f\n", tetrahedron = tetrahedron_ply,
-                    three = "v 0 0 0\nv 2 0 0\nv 0 2 0\n";
+  const std::string garbage = "no mesh at all\n\x01\x02\x03 v f\n", three = "v 0 0 0\nv 2 0 0\nv 0 2 0\n";
   const std::string strip =
       "ply\nformat binary_little_endian 1.0\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n";
-  struct Case {
-    std::string name, content, error;
-  };
-  for (const auto& [name, content, error] : std::vector<Case>{
+  for (const auto& [name, content, error] : std::vector<std::array<std::string, 3>>{
            {"empty.ply", "", "empty"},
            {"garbage.ply", garbage, "cannot read the mesh"},
            {"garbage.obj", garbage, "cannot read the mesh"},
@@ -296,15 +293,15 @@ TEST(ReadMeshTest, BadFilesAreOneClearLine) {
            {"two.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "face 0 has 2 corners"},
            {"index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "line 4: the face names vertex 9 of 3"},
            {"nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"},
-           {"index.ply", replaced(tetrahedron, "3 1 2 3", "3 1 2 4"), "not there"},
-           {"negative.ply", replaced(tetrahedron, "3 1 2 3", "3 1 2 -1"), "not there"},
+           {"index.ply", replaced(tetrahedron_ply, "3 1 2 3", "3 1 2 4"), "not there"},
+           {"negative.ply", replaced(tetrahedron_ply, "3 1 2 3", "3 1 2 -1"), "not there"},
            {"word.ply", ply_header("ascii", 1, 0) + "0 zero 0\n", "\"zero\" is not a number"},
            {"type.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty complex x\nend_header\n1\n", "\"complex\""},
            {"count.ply", "ply\nformat ascii 1.0\nelement vertex\nend_header\n", "no count"},
            {"strip.ply", strip + std::string("\xff\xc9\x9a\x3b", 4), "cut off"},
            {"huge.ply", ply_header("binary_little_endian", 2000000000, 3) + "abc", "cut off"},
-           {"nan.ply", replaced(tetrahedron, "1 0 0", "nan 0 0"), "not finite"},
-           {"far.ply", replaced(tetrahedron, "1 0 0", "1e39 0 0"), "vertex 1 is not finite in single precision"}}) {
+           {"nan.ply", replaced(tetrahedron_ply, "1 0 0", "nan 0 0"), "not finite"},
+           {"far.ply", replaced(tetrahedron_ply, "1 0 0", "1e39 0 0"), "vertex 1 is not finite in single precision"}}) {
     const Temporary file(name, content);
     ::testing::internal::CaptureStdout();
     ::testing::internal::CaptureStderr();
