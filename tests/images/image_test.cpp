@@ -123,10 +123,9 @@ TEST(ImageTest, UnknownEndingsAreRefused) {
 
 /// A picture whose values are all different, and beside them those that are not numbers.
 Image picture(int width, int height, std::vector<std::string> channels) {
-  Image image(width, height, std::move(channels));
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = 0.37f * static_cast<float>(i) - 100;
-  const std::vector<float> odd{NAN, INFINITY, -INFINITY, -0.0f, 1e-42f};
-  for (std::size_t i = 0; i < std::min(odd.size(), image.pixels.size()); ++i) image.pixels[i] = odd[i];
+  Image image = noise_image(width, height, std::move(channels));
+  const std::vector<float> odd{NAN, INFINITY, -INFINITY, -0.0f, 1e-42f, -100, 1e38f};
+  std::copy_n(odd.begin(), std::min(odd.size(), image.pixels.size()), image.pixels.begin());
   return image;
 }
 

@@ -177,21 +177,19 @@ TEST(TextureFileTest, EveryEightBitNumberIsDecodedExactly) {
 }
 
 TEST(TextureFileTest, FormatsOfPngAndTiff) {
-  const std::string inks("\0\0\0\0\xFF\0\0\0\0\0\0\xFF", 12);  // None, full cyan, full black.
+  const std::string rgba = png_file(2, 1, 4, 8, {10, 20, 250, 51, 3, 2, 1, 255});
+  // No ink, full cyan, full black.
+  const std::string cmyk = tiff_file(3, 1, 4, 8, 5, std::string("\0\0\0\0\xFF\0\0\0\0\0\0\xFF", 12));
   const Vector4f brown = linear(100, 50, 10, 0.2);
   using Case = std::tuple<std::string, std::string, std::vector<Vector4f>>;
   for (const auto& [name, content, expected] : std::vector<Case>{
            {"grey.png", png_file(2, 1, 1, 8, {51, 200}), {linear(51, 51, 51), linear(200, 200, 200)}},
            {"grey_alpha.png", png_file(2, 1, 2, 8, {51, 102, 200, 0}), {linear(51, 51, 51, 0.4), Vector4f::Zero()}},
-           {"rgba.png",
-            png_file(2, 1, 4, 8, {10, 20, 250, 51, 3, 2, 1, 255}),
-            {linear(10, 20, 250, 0.2), linear(3, 2, 1)}},
+           {"rgba.png", rgba, {linear(10, 20, 250, 0.2), linear(3, 2, 1)}},
            {"deep.png", png_file(1, 1, 3, 16, {1, 256, 65535}), {linear(1 / 257.0, 256 / 257.0, 255)}},
            {"straight.tif", tiff_file(1, 1, 4, 8, 2, "\x64\x32\x0A\x33", {{338, {1, 2}}}), {brown}},
            {"multiplied.tif", tiff_file(1, 1, 4, 8, 2, "\x14\x0A\x02\x33", {{338, {1, 1}}}), {brown}},
-           {"cmyk.tif",
-            tiff_file(3, 1, 4, 8, 5, inks),
-            {linear(255, 255, 255), linear(0, 255, 255), linear(0, 0, 0)}}}) {
+           {"cmyk.tif", cmyk, {linear(255, 255, 255), linear(0, 255, 255), linear(0, 0, 0)}}}) {
     const Temporary file(name, content);
     const Texture texture = texture_of(file);
     ASSERT_EQ(texture.width(), static_cast<int>(expected.size())) << name;
