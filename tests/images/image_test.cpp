@@ -4,13 +4,14 @@
 #include <clocale>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
+#include <map>
 #include <stdexcept>
 #include <thread>
 
 #include <dlfcn.h>
 
 #include "renderer/film/spectral_image.h"
-#include "renderer/images/formats.h"
 #include "tests/images/picture_files.h"
 #include "tests/renderer/support.h"
 
@@ -58,18 +59,17 @@ TEST_P(EveryEnding, FilesThatWereCutOffAreRefused) {
 TEST(ImageTest, TheSamePictureGivesTheSameBytesAtAnyTime) {
   const ImageMetadata metadata{{"ImageDescription", "a scene"}, {"Software", "tensorray"}};
   const auto write_all = [&] {
-    std::vector<std::string> files;
+    std::map<std::string, std::size_t> hashes;
     for (const std::string& ending : image_endings()) {
       const Temporary file("any_time" + ending);
       write_image(file, gradient(), metadata);
-      files.push_back(read_bytes(file));
+      hashes[ending] = std::hash<std::string>()(read_bytes(file));
     }
-    return files;
+    return hashes;
   };
-  const std::vector<std::string> first = write_all();
+  const auto first = write_all();
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // Time stamps have a resolution of one second.
-  const std::vector<std::string> second = write_all();
-  for (std::size_t i = 0; i < first.size(); ++i) EXPECT_TRUE(first[i] == second[i]) << image_endings()[i];
+  EXPECT_EQ(write_all(), first);
 }
 
 TEST(ImageTest, PngKeepsAllMetadataAndIsMarkedAsSrgb) {
@@ -114,10 +114,8 @@ TEST(ImageTest, DisplayFormatsChooseTheirChannels) {
 }
 
 TEST(ImageTest, UnknownEndingsAreRefused) {
-  const std::string text = message([] { write_image("/tmp/picture.bmpx", gradient()); });
-  EXPECT_EQ(text,
-            "cannot write /tmp/picture.bmpx: unknown picture ending \".bmpx\"; known: .exr, .png, .jpg, .jpeg, .tif, "
-            ".tiff");
+  EXPECT_EQ(message([] { write_image("/tmp/a.bmpx", gradient()); }),
+            "cannot write /tmp/a.bmpx: unknown picture ending \".bmpx\"; known: .exr, .png, .jpg, .jpeg, .tif, .tiff");
   EXPECT_THROW(write_image("/tmp/picture", gradient()), std::runtime_error);
 }
 
@@ -235,9 +233,10 @@ TEST(ImageDistance, IsAPartOfTheExactPicture) {
   other.pixels = {3, 5};
   EXPECT_DOUBLE_EQ(relative_distance(other, exact), 0.2);
   EXPECT_EQ(relative_distance(exact, exact), 0);
-  Image more(1, 1, {"R", "G", "B", "folds"}), less = more;
+  Image more(1, 1, {"R", "G", "B", "folds"});
   more.pixels = {1, 1, 1, 8};
-  less.pixels = {1, 1, 1, 2};
+  Image less = more;
+  less.pixels.back() = 2;
   EXPECT_EQ(relative_distance(more, less), 0) << "only colours count";
   EXPECT_EQ(relative_distance(exact, Image(2, 1, {"R"})), 0);
   EXPECT_THROW(relative_distance(exact, Image(1, 2, {"R"})), std::invalid_argument);

@@ -365,13 +365,12 @@ TEST(MeshNormalsTest, OfObjBelongToCorners) {
 TEST(MeshNormalsTest, OfPlyMayBeMissing) {
   // Vertices with and without normals, and numbers that are too small for double precision.
   const std::string position = "property float x\nproperty float y\nproperty float z\n";
-  for (const bool first : {true, false}) {
-    const std::string with = "element vertex 1\n" + position + "property float nz\n",
-                      without = "element vertex 2\n" + position;
-    const Temporary file("mixed.ply", "ply\nformat ascii 1.0\n" + (first ? with + without : without + with) +
-                                          "element face 1\nproperty list uchar int vertex_indices\nend_header\n" +
-                                          (first ? "0 0 1e-400 1\n+1 0 0\n0 1 0\n" : "1 0 0\n0 1 0\n0 0 0 1\n") +
-                                          "3 0 1 2\n");
+  const std::string with = "element vertex 1\n" + position + "property float nz\n";
+  const std::string without = "element vertex 2\n" + position;
+  const std::string face = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const std::string& content :
+       {with + without + face + "0 0 1e-400 1\n+1 0 0\n0 1 0\n", without + with + face + "1 0 0\n0 1 0\n0 0 0 1\n"}) {
+    const Temporary file("mixed.ply", "ply\nformat ascii 1.0\n" + content + "3 0 1 2\n");
     const MeshWithNormals mesh = read_mesh_with_normals(file, std::nullopt);
     ASSERT_EQ(mesh.normals.size(), 3u);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(mesh.normals[i].z(), mesh.mesh.vertices[i].isZero() ? 1 : 0) << i;

@@ -147,41 +147,16 @@ TEST(RandomUniformTest, KeysAreIndependent) {
 
 TEST(SobolTest, PairsAreItsFirstDimensions) {
   for (const std::uint64_t seed : {0u, 1u, 12345u})
-    for (const std::uint32_t index : {0u, 1u, 2u, 77u, 4096u, 3000000000u, 0xffffffffu}) {
-      const auto [x, y] = sobol_pair(seed, index);
-      EXPECT_EQ(x, sobol(seed, index, 0));
-      EXPECT_EQ(y, sobol(seed, index, 1));
-    }
+    for (const std::uint32_t index : {0u, 1u, 2u, 77u, 4096u, 3000000000u, 0xffffffffu})
+      EXPECT_EQ(sobol_pair(seed, index), (std::array{sobol(seed, index, 0), sobol(seed, index, 1)})) << index;
 }
 
-TEST(SobolTest, FirstPointsFillEveryElementaryInterval) {
-  for (const std::uint64_t seed : {0u, 1u, 12345u})
-    for (int k = 0; k <= 10; ++k)
-      for (int i = 0; i <= k; ++i) {
-        std::vector<int> counts(1 << k);
-        for (int index = 0; index < (1 << k); ++index) {
-          const int column = static_cast<int>(std::ldexp(sobol(seed, index, 0), i));
-          const int row = static_cast<int>(std::ldexp(sobol(seed, index, 1), k - i));
-          ++counts[(column << (k - i)) + row];
-        }
-        ASSERT_THAT(counts, Each(1)) << "seed " << seed << ", 2^" << k << " points, column bits " << i;
-      }
-}
-
-/// The coordinates of a joint point, with one of its twins.
-std::array<double, 4> joint_point(std::uint64_t key, int index, bool second) {
-  const auto i = static_cast<std::uint32_t>(index);
-  const auto [x, y] = joint_sobol_start(key, i);
-  const SobolTwins twins = joint_sobol_twins(key + 1, i);
-  const auto [z, w] = second ? twins.second : twins.first;
-  return {x, y, z, w};
-}
-
-/// Whether each box of 2^-bits[0] × … has as many of the first 2^k joint points.
-bool is_even(int k, const std::array<int, 4>& bits, bool second) {
+/// Whether each box of 2^-bits[0] × … has as many of the first 2^k points.
+template <class Point>
+bool is_even(int k, const std::array<int, 4>& bits, const Point& point_of) {
   std::vector<int> counts(std::size_t{1} << (bits[0] + bits[1] + bits[2] + bits[3]));
   for (int index = 0; index < (1 << k); ++index) {
-    const std::array<double, 4> point = joint_point(77, index, second);
+    const std::array<double, 4> point = point_of(index);
     std::size_t box = 0;
     for (std::size_t axis = 0; axis < 4; ++axis)
       box = (box << bits[axis]) + static_cast<std::size_t>(std::ldexp(point[axis], bits[axis]));
@@ -190,16 +165,35 @@ bool is_even(int k, const std::array<int, 4>& bits, bool second) {
   return std::all_of(counts.begin(), counts.end(), [&](int count) { return count == counts[0]; });
 }
 
+TEST(SobolTest, FirstPointsFillEveryElementaryInterval) {
+  for (const std::uint64_t seed : {0u, 1u, 12345u}) {
+    const auto point = [&](int index) { return std::array{sobol(seed, index, 0), sobol(seed, index, 1), 0.0, 0.0}; };
+    for (int k = 0; k <= 10; ++k)
+      for (int i = 0; i <= k; ++i)
+        ASSERT_TRUE(is_even(k, {i, k - i, 0, 0}, point))
+            << "seed " << seed << ", 2^" << k << " points, column bits " << i;
+  }
+}
+
 TEST(SobolTest, FourDimensionsAreStratifiedTogether) {
-  for (const bool second : {false, true})
+  for (const bool second : {false, true}) {
+    // A joint point, with one of its twins.
+    const auto point = [second](int index) {
+      const auto i = static_cast<std::uint32_t>(index);
+      const auto [x, y] = joint_sobol_start(77, i);
+      const SobolTwins twins = joint_sobol_twins(78, i);
+      const auto [z, w] = second ? twins.second : twins.first;
+      return std::array<double, 4>{x, y, z, w};
+    };
     for (int k = 2; k <= 10; ++k) {
       const int bits = k - (k <= 7 ? 2 : 3);
       for (int a = 0; a <= bits; ++a)
         for (int b = 0; a + b <= bits; ++b)
           for (int c = 0; a + b + c <= bits; ++c)
-            EXPECT_TRUE(is_even(k, {a, b, c, bits - a - b - c}, second)) << k << ": " << a << " " << b << " " << c;
-      for (int a = 0; a <= k; ++a) EXPECT_TRUE(is_even(k, {a, k - a, 0, 0}, second)) << k << ": " << a;
+            EXPECT_TRUE(is_even(k, {a, b, c, bits - a - b - c}, point)) << k << ": " << a << " " << b << " " << c;
+      for (int a = 0; a <= k; ++a) EXPECT_TRUE(is_even(k, {a, k - a, 0, 0}, point)) << k << ": " << a;
     }
+  }
 }
 
 TEST(SobolTest, TwinsAreUncorrelated) {

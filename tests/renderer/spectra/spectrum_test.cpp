@@ -42,23 +42,20 @@ TEST(ObserverTest, EqualsTheReferenceTable) {
   EXPECT_EQ(rows, 471);
 }
 
-TEST(IlluminantTest, WhitePoints) {
+TEST(SpectrumTest, LightsHaveTheirChromaticities) {
   expect_chromaticity(illuminant("D65"), 0.3127, 0.3290, 1e-4);
   expect_chromaticity(illuminant("A"), 0.4476, 0.4074, 1e-4);
   expect_chromaticity(illuminant("E"), 1 / 3.0, 1 / 3.0, 1e-4);
-}
-
-TEST(IlluminantTest, KnowsItsNames) {
-  for (const std::string& name : illuminant_names()) EXPECT_DOUBLE_EQ(illuminant(name).at(560), 100) << name;
-  EXPECT_THAT(message([] { illuminant("D50"); }), HasSubstr("\"D50\"; known: D65, E, A"));
-}
-
-TEST(BlackbodyTest, Chromaticities) {
   // Of the Planckian locus (CIE 1931).
   expect_chromaticity(blackbody(6500), 0.3135, 0.3237, 2e-4);
   expect_chromaticity(blackbody(5000), 0.3451, 0.3516, 2e-4);
   expect_chromaticity(blackbody(2856), 0.4476, 0.4074, 2e-4);
   expect_chromaticity(blackbody(2000), 0.5267, 0.4133, 2e-4);
+}
+
+TEST(IlluminantTest, KnowsItsNames) {
+  for (const std::string& name : illuminant_names()) EXPECT_DOUBLE_EQ(illuminant(name).at(560), 100) << name;
+  EXPECT_THAT(message([] { illuminant("D50"); }), HasSubstr("\"D50\"; known: D65, E, A"));
 }
 
 TEST(BlackbodyTest, FollowsPlanckAtAllTemperatures) {
