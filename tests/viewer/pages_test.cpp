@@ -149,10 +149,8 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
   unknown["ligth"] = 1;
   field["field"] = {{"file", "/dev/zero"}};
   int id = 10;
-  for (const Json& scene : {foreign, huge, unknown, field}) {
-    const Json answer = page_.answer("error", test::scene_message(++id, scene)).json;
-    EXPECT_THAT(answer.at("message").get<std::string>(), Not(HasSubstr("\n")));
-  }
+  for (const Json& scene : {foreign, huge, unknown, field})
+    EXPECT_THAT(page_.error(test::scene_message(++id, scene)), Not(HasSubstr("\n")));
   // The fuzzer `page` sends others.
   const std::vector<std::string> wrong{"{", R"({"type":"shutdown"})", R"({"type":"scene","scene":[]})",
                                        R"({"type":"export","file":"../x"})", std::string(100000, '[')};
@@ -189,10 +187,8 @@ TEST_F(PagesTest, AnImportHasTheNameOfItsFile) {
   Json wrong = scene, other = scene;
   wrong["light"]["photons"] = -1;
   other["field"]["file"] = "other.vdb";
-  const Json of_wrong = page.answer("error", test::scene_message(1, wrong)).json;
-  EXPECT_THAT(of_wrong.at("message").get<std::string>(), HasSubstr("part.vtu"));
-  const Json of_other = page.answer("error", test::scene_message(4, other)).json;
-  EXPECT_THAT(of_other.at("message").get<std::string>(), HasSubstr("this view shows"));
+  EXPECT_THAT(page.error(test::scene_message(1, wrong)), HasSubstr("part.vtu"));
+  EXPECT_THAT(page.error(test::scene_message(4, other)), HasSubstr("this view shows"));
   page.final_picture(2, scene);
   EXPECT_EQ(page.answer("file", {{"type", "export"}, {"id", 3}, {"file", "png"}}).json.at("name"), "part.png");
   for (const test::Received& message : page.all()) EXPECT_THAT(message.json.dump(), Not(HasSubstr("made.vdb")));

@@ -124,6 +124,7 @@ class Mailbox {
     send(message);
     return wait(type, message.at("id"));
   }
+  std::string error(const Json& message) { return answer("error", message).json.at("message"); }
   Received final_picture(int id, const Json& scene) {
     send(scene_message(id, scene));
     return final_picture(id);

@@ -30,7 +30,7 @@ struct Sample {
 };
 
 /// The corners of all triangles, in the precision of files.
-std::vector<Vector3f> corners_of(const TriangleMesh& mesh) {
+std::vector<Vector3f> all_corners(const TriangleMesh& mesh) {
   std::vector<Vector3f> corners;
   for (const auto& triangle : mesh.triangles)
     for (const std::uint32_t vertex : triangle) corners.push_back(mesh.vertices[vertex].cast<float>());
@@ -44,7 +44,7 @@ TEST(MeshFilesTest, ReadBack) {
       const Temporary file(name);
       write_mesh(file, sample.mesh, attributes);
       EXPECT_GT(std::filesystem::file_size(file), 2u << 20);
-      EXPECT_TRUE(corners_of(read_mesh(file)) == corners_of(sample.mesh)) << name;
+      EXPECT_TRUE(all_corners(read_mesh(file)) == all_corners(sample.mesh)) << name;
     }
 }
 
@@ -70,7 +70,7 @@ TEST(MeshFilesTest, PlyHoldsAttributes) {
     expected += '\3';
     append(triangle.data(), 3);
   }
-  EXPECT_TRUE(read_bytes(file) == expected) << read_bytes(file);
+  EXPECT_EQ(read_bytes(file), expected);
 }
 
 TEST(MeshFilesTest, ObjHoldsColorsAndNormals) {

@@ -86,12 +86,9 @@ TEST(RequireClosedTest, AcceptsBoxesThatTouchAlongAnEdge) {
 }
 
 TEST(RequireClosedTest, RefusesWhatEnclosesNothing) {
-  TriangleMesh leaf;
-  leaf.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  leaf.triangles = {{0, 1, 2}, {0, 2, 1}};
-  EXPECT_THAT(message([&] { require_closed(leaf); }), HasSubstr("no volume"));
-  TriangleMesh nothing;
-  EXPECT_THAT(message([&] { require_closed(nothing); }), HasSubstr("no volume"));
+  const TriangleMesh leaf{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 1}}}, nothing;
+  for (TriangleMesh mesh : {leaf, nothing})
+    EXPECT_THAT(message([&] { require_closed(mesh); }), HasSubstr("no volume")) << mesh.triangles.size();
 }
 
 /// The tetrahedron in binary, with properties and elements that are not needed. It is moved so that the first byte of
