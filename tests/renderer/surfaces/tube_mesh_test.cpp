@@ -291,8 +291,7 @@ TEST(TubeMesh, TheNumberOfTrianglesIsBounded) {
   settings.spacing = 1e-15;
   EXPECT_THROW(make_tube_mesh({tube}, settings), std::runtime_error);
   // However small the tolerance is, a solid tube has 64 rings for each of its points.
-  settings = settings_of(TubeStyle::solid, TubeCaps::open, 1e-300);
-  EXPECT_LE(make_tube_mesh({arc(0.2, 2, 5)}, settings).mesh.vertices.size(), 5u * 64 * 64);
+  EXPECT_LE(solid(arc(0.2, 2, 5), TubeCaps::open, 1e-300).mesh.vertices.size(), 5u * 64 * 64);
 }
 
 }  // namespace
