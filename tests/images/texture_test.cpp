@@ -255,8 +255,10 @@ std::string error_of(const std::string& name, const std::string& content) {
   return text.rfind(beginning, 0) == 0 ? text.substr(beginning.size()) : text;
 }
 
-TEST(TextureFileTest, ReadersMayFailWithoutAWord) {
-  EXPECT_EQ(error_of("silent.ppm", "P6 9 9 255\nshort"), "the file is cut off or damaged");
+TEST(TextureFileTest, BadFilesAreRefused) {
+  EXPECT_EQ(error_of("silent.ppm", "P6 9 9 255\nshort"), "the file is cut off or damaged");  // Its reader says nothing.
+  const std::string too_large = png_file(60000, 60000, 3, 8, {0});  // Refused before it is read.
+  EXPECT_EQ(error_of("a.png", too_large), "its 60000 x 60000 pixels take more than 8 GiB; make it smaller");
 }
 
 TEST(TextureFileTest, NoPartOfATiffIsMadeUp) {
@@ -273,11 +275,6 @@ TEST(TextureFileTest, NoPartOfATiffIsMadeUp) {
     changed[at] = static_cast<char>(~changed[at]);  // Only the sum of zlib's stream tells.
     EXPECT_THAT(error_of("changed.tif", changed), HasSubstr("damaged")) << at;
   }
-}
-
-TEST(TextureFileTest, FilesTooLargeAreRefusedBeforeTheyAreRead) {
-  EXPECT_EQ(error_of("giant.png", png_file(60000, 60000, 3, 8, {0})),
-            "its 60000 x 60000 pixels take more than 8 GiB; make it smaller");
 }
 
 }  // namespace

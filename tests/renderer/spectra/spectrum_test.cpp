@@ -79,8 +79,7 @@ TEST(BandsTest, SumsHoldForEveryCount) {
           power += band.power;
           luminance += band.xyz.y();
           width += band.width;
-          EXPECT_GT(band.wavelength, low);
-          EXPECT_LT(band.wavelength, high);
+          EXPECT_TRUE(band.wavelength > low && band.wavelength < high) << band.wavelength;
         }
         EXPECT_NEAR(power, 1, 1e-12);
         EXPECT_NEAR(luminance, 1, 1e-12);
