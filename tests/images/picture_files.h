@@ -5,11 +5,15 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "renderer/images/image.h"
+#include <Eigen/Core>
+#include <zlib.h>
+
+#include "renderer/images/formats.h"
 
 namespace tensorray {
 
@@ -22,7 +26,26 @@ inline Image noise_image(int width, int height, std::vector<std::string> channel
   return image;
 }
 
-/// The bytes of a number, least significant first.
+/// What is left of a file that was cut off. @param part  From 0 to 1.
+inline std::string first_part(const std::string& bytes, double part) {
+  return bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size())));
+}
+
+inline std::string exr_bytes(const Image& image, const ImageMetadata& metadata = {}) {
+  const std::vector<unsigned char> bytes = encode_exr(image, metadata, 1);
+  return {bytes.begin(), bytes.end()};
+}
+
+/// A picture whose pixel (x, y) has this colour.
+template <class Color>
+Image image_of(int width, int height, const Color& color) {
+  Image image(width, height, {"R", "G", "B"});
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) Eigen::Vector3f::Map(image.pixel(x, y)) = color(x, y).template cast<float>();
+  return image;
+}
+
+/// The bytes of a number, or of several, each with the least significant byte first.
 template <class Number>
 std::string little_endian(Number number) {
   std::string bytes(sizeof(Number), '\0');
@@ -36,30 +59,19 @@ inline std::string big_endian(std::uint32_t number) {
 }
 
 inline std::string png_chunk(const std::string& name, const std::string& data) {
-  std::uint32_t crc = 0xFFFFFFFF;
-  for (const unsigned char byte : name + data) {
-    crc ^= byte;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (crc & 1 ? 0xEDB88320 : 0);
-  }
-  return big_endian(static_cast<std::uint32_t>(data.size())) + name + data + big_endian(~crc);
+  const std::string summed = name + data;
+  const uLong sum = crc32(0, reinterpret_cast<const Bytef*>(summed.data()), static_cast<uInt>(summed.size()));
+  return big_endian(static_cast<std::uint32_t>(data.size())) + summed + big_endian(static_cast<std::uint32_t>(sum));
 }
 
 /// Wraps data in the container of Deflate (zlib), without compression.
 inline std::string zlib_stored(const std::string& data) {
-  constexpr std::size_t longest = 65535;
-  std::string result = "\x78\x01";
-  for (std::size_t begin = 0; begin < data.size(); begin += longest) {
-    const std::string block = data.substr(begin, longest);
-    const auto size = static_cast<std::uint16_t>(block.size());
-    result += (begin + longest >= data.size() ? '\1' : '\0') + little_endian(size) +
-              little_endian(static_cast<std::uint16_t>(~size)) + block;
-  }
-  std::uint32_t a = 1, b = 0;
-  for (const unsigned char byte : data) {
-    a = (a + byte) % 65521;
-    b = (b + a) % 65521;
-  }
-  return result + big_endian(b << 16 | a);
+  uLongf size = compressBound(data.size());
+  std::string result(size, '\0');
+  compress2(reinterpret_cast<Bytef*>(result.data()), &size, reinterpret_cast<const Bytef*>(data.data()), data.size(),
+            Z_NO_COMPRESSION);
+  result.resize(size);
+  return result;
 }
 
 /// A PNG of 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA) channels of 8 or 16 bits. `values` are row by row from the
@@ -106,24 +118,20 @@ inline std::string tiff_file(int width, int height, int channels, int bits, int 
   return file + pixels + std::string(pixels.size() % 2, '\0') + tiff_directory(tags);
 }
 
-/// An RGB TIFF of 64 x 64 pixels of 8 bits in eight strips, whose directory is in front of them. @param is_deflated
-/// Each strip is a stream of zlib. @param first_strip  Where the directory says that the first strip is; 0: where it
-/// is.
+/// An RGB TIFF of 64 x 64 pixels of 8 bits in eight strips, whose directory is in front of them.
+/// @param is_deflated  Each strip is a stream of zlib.
+/// @param first_strip  Where the directory says that the first strip is; 0: where it is.
 inline std::string striped_tiff(bool is_deflated, std::uint32_t first_strip = 0) {
   constexpr std::uint32_t strips = 8, rows = 8, bits_at = 122, offsets_at = bits_at + 12, counts_at = offsets_at + 32;
   std::string strip(64 * rows * 3, '\0');
   for (std::size_t i = 0; i < strip.size(); ++i) strip[i] = static_cast<char>(100 + i * i % 101);
   if (is_deflated) strip = zlib_stored(strip);
   const auto size = static_cast<std::uint32_t>(strip.size());
-  std::string file = std::string("II*\0\x08\0\0\0", 8) + tiff_directory({{256, {1, 64}},
-                                                                         {257, {1, 64}},
-                                                                         {258, {3, bits_at}},
-                                                                         {259, {1, is_deflated ? 8 : 1}},
-                                                                         {262, {1, 2}},
-                                                                         {273, {strips, offsets_at}},
-                                                                         {277, {1, 3}},
-                                                                         {278, {1, rows}},
-                                                                         {279, {strips, counts_at}}});
+  const int compression = is_deflated ? 8 : 1;
+  const TiffTags tags{{256, {1, 64}},          {257, {1, 64}},   {258, {3, bits_at}},
+                      {259, {1, compression}}, {262, {1, 2}},    {273, {strips, offsets_at}},
+                      {277, {1, 3}},           {278, {1, rows}}, {279, {strips, counts_at}}};
+  std::string file = std::string("II*\0\x08\0\0\0", 8) + tiff_directory(tags);
   for (int i = 0; i < 3; ++i) file += little_endian(std::uint32_t{8});
   for (std::uint32_t i = 0; i < strips; ++i)
     file += little_endian(i == 0 && first_strip > 0 ? first_strip : counts_at + 4 * strips + i * size);
@@ -143,19 +151,20 @@ inline std::string exr_attribute(const std::string& name, const std::string& typ
 }
 
 /// The header of an uncompressed OpenEXR file of 32-bit floats.
-/// @param channels  In alphabetical order; and the distance of their samples along x and y.
-inline std::string exr_header(const ExrWindow& display, const ExrWindow& data,
-                              const std::vector<std::pair<std::string, int>>& channels) {
+/// @param channels  In alphabetical order.
+/// @param halved    Those that have a sample for every second pixel along x and y.
+inline std::string exr_header(const ExrWindow& display, const ExrWindow& data, const std::vector<std::string>& channels,
+                              const std::set<std::string>& halved = {}) {
   const std::string zero(1, '\0');
-  const auto box = [](const ExrWindow& w) {
-    return little_endian(w.x0) + little_endian(w.y0) + little_endian(w.x1) + little_endian(w.y1);
-  };
   std::string list;
-  for (const auto& [name, sampling] : channels)
-    list += name + zero + little_endian(2) + little_endian(0) + little_endian(sampling) + little_endian(sampling);
+  for (const std::string& name : channels) {
+    const int step = halved.count(name) > 0 ? 2 : 1;
+    list += name + zero + little_endian(2) + little_endian(0) + little_endian(step) + little_endian(step);
+  }
   return "\x76\x2f\x31\x01" + little_endian(2) + exr_attribute("channels", "chlist", list + zero) +
-         exr_attribute("compression", "compression", zero) + exr_attribute("dataWindow", "box2i", box(data)) +
-         exr_attribute("displayWindow", "box2i", box(display)) + exr_attribute("lineOrder", "lineOrder", zero) +
+         exr_attribute("compression", "compression", zero) + exr_attribute("dataWindow", "box2i", little_endian(data)) +
+         exr_attribute("displayWindow", "box2i", little_endian(display)) +
+         exr_attribute("lineOrder", "lineOrder", zero) +
          exr_attribute("pixelAspectRatio", "float", little_endian(1.0f)) +
          exr_attribute("screenWindowCenter", "v2f", little_endian(0.0f) + little_endian(0.0f)) +
          exr_attribute("screenWindowWidth", "float", little_endian(1.0f)) + zero;
@@ -165,9 +174,7 @@ inline std::string exr_header(const ExrWindow& display, const ExrWindow& data,
 /// @param values    For each row of the data window, for each channel, its values along the row.
 inline std::string exr_file(const ExrWindow& display, const ExrWindow& data, const std::vector<std::string>& channels,
                             const std::vector<float>& values) {
-  std::vector<std::pair<std::string, int>> sampled;
-  for (const std::string& name : channels) sampled.emplace_back(name, 1);
-  std::string file = exr_header(display, data, sampled);
+  std::string file = exr_header(display, data, channels);
   const std::size_t rows = data.y1 - data.y0 + 1, row_values = values.size() / rows, row_bytes = row_values * 4;
   const std::size_t rows_at = file.size() + rows * 8;
   for (std::size_t row = 0; row < rows; ++row)

@@ -9,7 +9,6 @@
 #include "renderer/images/image.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "tests/data_folder.h"
-#include "tests/names.h"
 #include "tests/viewer/view_support.h"
 #include "tools/viewer/stages.h"
 #include "volumes/files/tensor_files.h"
@@ -23,31 +22,23 @@ namespace fs = std::filesystem;
 class PagesTest : public test::ViewTest {
  protected:
   Progress progress_;
-  test::Mailbox mailbox_, other_mailbox_;  // Pages' thread sends to them until Pages ends.
+  test::Mailbox page_, other_;
   Pages pages_{viewed(), progress_};
-  Pages::Id page_ = pages_.open(mailbox_.sender());
+  Json scene_ = test::small_scene();
 
-  static std::string scene_message(int id, const Json& scene) {
-    return Json{{"type", "scene"}, {"id", id}, {"scene", scene}}.dump();
-  }
-  void send(const Json& message) { pages_.receive(page_, message.dump()); }
-  void send_scene(int id, const Json& scene) { pages_.receive(page_, scene_message(id, scene)); }
+  PagesTest() { page_.open(pages_); }
 
   Image picture_of(const test::Received& message, const std::string& ending) {
-    const std::filesystem::path file = in_folder("received" + ending);
-    std::ofstream(file, std::ios::binary) << message.bytes;
-    return read_image(file);
+    write_bytes(in_folder("received" + ending), message.bytes);
+    return read_image(in_folder("received" + ending));
   }
 };
 
 TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
-  send_scene(1, test::small_scene());
-  const test::Received last = mailbox_.final_picture(1);
-  std::vector<Json> pictures;
-  for (const test::Received& message : mailbox_.all())
-    if (message.json.at("type") == "picture") pictures.push_back(message.json);
-  EXPECT_EQ(pictures.front().at("stage"), 0);
-  EXPECT_LT(pictures.front().at("width"), 64);
+  const test::Received last = page_.final_picture(1, test::small_scene());
+  const Json first = page_.wait("picture", 1).json;
+  EXPECT_EQ(first.at("stage"), 0);
+  EXPECT_LT(first.at("width"), 64);
   EXPECT_EQ(last.json.at("width"), 64);
   EXPECT_EQ(last.json.at("/chosen/field/scale"_json_pointer), 4);
 
@@ -57,8 +48,7 @@ TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
   const std::vector<unsigned char> expected_png = encode_for_screen(display_image(anew.scene(), *render, false));
   EXPECT_EQ(last.bytes, std::string(expected_png.begin(), expected_png.end()));
 
-  send({{"type", "export"}, {"id", 2}, {"file", "exr"}});
-  const test::Received file = mailbox_.wait("file", 2);
+  const test::Received file = page_.answer("file", {{"type", "export"}, {"id", 2}, {"file", "exr"}});
   EXPECT_EQ(file.json.at("name"), "scene.exr");
   write_image(in_folder("expected.exr"), render->linear);
   const Image exported = picture_of(file, ".exr"), expected = read_image(in_folder("expected.exr"));
@@ -69,41 +59,37 @@ TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
 /// Of light that is traced, the finished picture is there at once.
 TEST_F(PagesTest, ATurnedAnalyserHasNoCoarsePicture) {
   const auto first_picture = [&](int id, const Json& scene) {
-    send_scene(id, scene);
-    const Json first = mailbox_.wait("picture", id).json;
-    mailbox_.final_picture(id);
-    return first;
+    page_.final_picture(id, scene);
+    return page_.wait("picture", id).json;
   };
-  Json scene = test::small_scene();
-  scene["integrator"] = {{"type", "polariscope"}};
-  EXPECT_LT(first_picture(1, scene).at("width"), 64);
-  scene["integrator"]["analyzer"] = 10;
-  const Json turned = first_picture(2, scene);
+  scene_["integrator"] = {{"type", "polariscope"}};
+  EXPECT_LT(first_picture(1, scene_).at("width"), 64);
+  scene_["integrator"]["analyzer"] = 10;
+  const Json turned = first_picture(2, scene_);
   EXPECT_EQ(turned.at("width"), 64);
   EXPECT_TRUE(turned.at("final"));
-  EXPECT_EQ(picture_of(mailbox_.final_picture(2), ".png").width, 64);
-  scene["integrator"]["samples"] = 1;  // All is traced again.
-  EXPECT_LT(first_picture(3, scene).at("width"), 64);
+  EXPECT_EQ(picture_of(page_.final_picture(2), ".png").width, 64);
+  scene_["integrator"]["samples"] = 1;  // All is traced again.
+  EXPECT_LT(first_picture(3, scene_).at("width"), 64);
 }
 
 /// Scenes that come while the page's thread is busy: here, while it sends its first message.
 TEST_F(PagesTest, TheNewestSceneWins) {
   std::promise<void> all_sent;
   const std::shared_future<void> is_free = all_sent.get_future().share();
-  const auto receive = other_mailbox_.sender();
+  const auto receive = other_.sender();
   const Pages::Id page = pages_.open([receive, is_free](const PageMessage& message) {
     is_free.wait();
     receive(message);
   });
-  Json scene = test::small_scene();
   for (int id = 1; id <= 40; ++id) {
-    scene["field"]["scale"] = 4 + 0.01 * id;
-    pages_.receive(page, scene_message(id, scene));
+    scene_["field"]["scale"] = 4 + 0.01 * id;
+    pages_.receive(page, test::scene_message(id, scene_).dump());
   }
   all_sent.set_value();
-  EXPECT_NEAR(other_mailbox_.final_picture(40).json.at("/chosen/field/scale"_json_pointer).get<double>(), 4.4, 1e-9);
+  EXPECT_NEAR(other_.final_picture(40).json.at("/chosen/field/scale"_json_pointer).get<double>(), 4.4, 1e-9);
   std::set<int> shown;
-  for (const test::Received& message : other_mailbox_.all())
+  for (const test::Received& message : other_.all())
     if (message.json.at("type") == "picture") shown.insert(message.json.at("id").get<int>());
   // The thread had either not begun, or shows the first picture of the scene that it had.
   EXPECT_LE(shown.size(), 2u);
@@ -111,153 +97,128 @@ TEST_F(PagesTest, TheNewestSceneWins) {
 }
 
 TEST_F(PagesTest, TellsAboutAPixelAndTheLightThere) {
-  send_scene(1, test::small_scene());
-  mailbox_.final_picture(1);
+  page_.final_picture(1, test::small_scene());
   // The spectrum comes with a further picture, which is made while nothing else is to be done.
-  mailbox_.wait("details", 1);
-  send({{"type", "look"}, {"id", 2}, {"x", 0.3}, {"y", 0.4}});
-  const Json answer = mailbox_.wait("look", 2).json;
+  page_.wait("details", 1);
+  const Json answer = page_.answer("look", {{"type", "look"}, {"id", 2}, {"x", 0.3}, {"y", 0.4}}).json;
   EXPECT_EQ(answer.at("spectrum").at("nm").size(), 8u);
   ASSERT_GE(answer.at("rays").size(), 3u);
   // Each ray ends at the place of the plate that was asked for.
-  send({{"type", "space"}, {"id", 300}});
-  const Json plate = mailbox_.wait("space", 300).json.at("plate");
-  const auto vector = [](const Json& json) { return Eigen::Vector3d(json[0], json[1], json[2]); };
-  const Eigen::Vector3d right = vector(plate[1]) - vector(plate[0]), up = vector(plate[3]) - vector(plate[0]);
-  const Eigen::Vector3d expected = vector(plate[3]) + 0.3 * right - 0.4 * up;
+  const Json plate = page_.answer("space", {{"type", "space"}, {"id", 300}}).json.at("plate");
+  const auto vector = [](const Json& json) { return Vector3d(json[0], json[1], json[2]); };
+  const Vector3d right = vector(plate[1]) - vector(plate[0]), up = vector(plate[3]) - vector(plate[0]);
+  const Vector3d expected = vector(plate[3]) + 0.3 * right - 0.4 * up;
   for (const Json& ray : answer.at("rays"))
     EXPECT_LT((vector(ray.at("points").back()) - expected).norm(), 0.03 * right.norm()) << ray;
 }
 
 /// A picture of a camera has bands of its own, fewer than the light has or more.
 TEST_F(PagesTest, APixelHasTheBandsOfItsPicture) {
-  Json scene = test::small_scene();
-  scene["integrator"] = {{"type", "path_tracing"}, {"bands", 6}, {"max_samples", 1}, {"min_samples", 1}};
-  scene["camera"] = {{"resolution", {16, 16}}};
+  scene_["integrator"] = {{"type", "path_tracing"}, {"bands", 6}, {"max_samples", 1}, {"min_samples", 1}};
+  scene_["camera"] = {{"resolution", {16, 16}}};
   for (const int count : {3, 12}) {
-    scene["light"]["wavelengths"]["count"] = count;
-    send_scene(count, scene);
-    mailbox_.final_picture(count);
-    send({{"type", "look"}, {"id", 100 + count}, {"x", 0}, {"y", 0}});
-    const Json spectrum = mailbox_.wait("look", 100 + count).json.at("spectrum");
+    scene_["light"]["wavelengths"]["count"] = count;
+    page_.final_picture(count, scene_);
+    const Json look{{"type", "look"}, {"id", 100 + count}, {"x", 0}, {"y", 0}};
+    const Json spectrum = page_.answer("look", look).json.at("spectrum");
     EXPECT_EQ(spectrum.at("nm").size(), 6u);
     for (const Json& value : spectrum.at("values")) EXPECT_TRUE(value >= 0 && value < 100) << value;
   }
 }
 
 TEST_F(PagesTest, SavesToItsOwnFileAlone) {
-  Json scene = test::small_scene();
-  scene["field"]["scale"] = 7;
-  send({{"type", "save"}, {"id", 5}, {"scene", scene}});
-  EXPECT_EQ(mailbox_.wait("saved", 5).json.at("file"), in_folder("scene.view.json").string());
-  EXPECT_EQ(read_json_object(in_folder("scene.view.json")), scene);
+  scene_["field"]["scale"] = 7;
+  const std::filesystem::path copy = in_folder("scene.view.json");
+  EXPECT_EQ(page_.answer("saved", {{"type", "save"}, {"id", 5}, {"scene", scene_}}).json.at("file"), copy.string());
+  EXPECT_EQ(read_json_object(copy), scene_);
   EXPECT_EQ(read_json_object(scene_file()), test::small_scene());
-  Json wrong = scene;
+  Json wrong = scene_;
   wrong["nonsense"] = 1;
-  send({{"type", "save"}, {"id", 6}, {"scene", wrong}});
-  mailbox_.wait("error", 6);
-  EXPECT_EQ(read_json_object(in_folder("scene.view.json")), scene);
+  page_.answer("error", {{"type", "save"}, {"id", 6}, {"scene", wrong}});
+  EXPECT_EQ(read_json_object(copy), scene_);
   EXPECT_THROW(Pages({scene_file(), {}, scene_file()}, progress_), std::invalid_argument);
-  std::filesystem::remove(in_folder("scene.view.json"));
-  ASSERT_EQ(mkfifo(in_folder("scene.view.json").c_str(), 0600), 0);  // To open it would wait for a reader.
-  send({{"type", "save"}, {"id", 7}, {"scene", scene}});
-  mailbox_.wait("error", 7);
+  std::filesystem::remove(copy);
+  ASSERT_EQ(mkfifo(copy.c_str(), 0600), 0);  // To open it would wait for a reader.
+  page_.answer("error", {{"type", "save"}, {"id", 7}, {"scene", scene_}});
 }
 
 TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
-  Json foreign = test::small_scene(), huge = foreign, unknown = foreign;
+  Json foreign = scene_, huge = foreign, unknown = foreign, field = foreign;
   foreign["obstacles"] = {{{"file", "/etc/passwd"}}};
   huge["receiver"]["resolution"] = {30000, 30000};
   unknown["ligth"] = 1;
-  Json field = test::small_scene();
   field["field"] = {{"file", "/dev/zero"}};
   int id = 10;
-  for (const Json& scene : {foreign, huge, unknown, field}) {
-    send_scene(++id, scene);
-    const std::string text = mailbox_.wait("error", id).json.at("message");
-    EXPECT_EQ(text.find('\n'), std::string::npos);
-  }
+  for (const Json& scene : {foreign, huge, unknown, field})
+    EXPECT_THAT(page_.error(test::scene_message(++id, scene)), Not(HasSubstr("\n")));
   // The fuzzer `page` sends others.
   const std::vector<std::string> wrong{"{", R"({"type":"shutdown"})", R"({"type":"scene","scene":[]})",
                                        R"({"type":"export","file":"../x"})", std::string(100000, '[')};
-  for (const std::string& text : wrong) pages_.receive(page_, text);
-  for (int i = 0; i < 1000; ++i) send({{"type", "look"}, {"id", 1000 + i}, {"x", 1e308}, {"y", -1e308}});
-  send_scene(20, test::small_scene());
-  EXPECT_TRUE(mailbox_.final_picture(20).json.at("final"));
+  for (const std::string& text : wrong) page_.send_text(text);
+  for (int i = 0; i < 1000; ++i) page_.send({{"type", "look"}, {"id", 1000 + i}, {"x", 1e308}, {"y", -1e308}});
+  page_.final_picture(20, test::small_scene());
   std::size_t errors = 0;
-  for (const test::Received& message : mailbox_.all()) errors += message.json.at("type") == "error" ? 1 : 0;
+  for (const test::Received& message : page_.all()) errors += message.json.at("type") == "error" ? 1 : 0;
   EXPECT_GE(errors, 4 + wrong.size());
 }
 
 /// A page that comes while another one looks at another field.
 TEST_F(PagesTest, AllPagesBeginWithTheSameField) {
-  Json scene = test::small_scene();
-  scene["field"]["generate"]["resolution"] = 7;
-  send_scene(1, scene);
-  mailbox_.final_picture(1);
-  pages_.open(other_mailbox_.sender());
-  const Json hello = other_mailbox_.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
-  EXPECT_EQ(hello.at("field").at("voxels")[0], 12);
+  scene_["field"]["generate"]["resolution"] = 7;
+  page_.final_picture(1, scene_);
+  other_.open(pages_);
+  EXPECT_EQ(other_.hello().at("field").at("voxels")[0], 12);
 }
 
 /// The field that an import made has a name that the user has never seen.
 TEST_F(PagesTest, AnImportHasTheNameOfItsFile) {
   write_tensor_vdb(in_folder("made.vdb"), generate(Helix{}, default_grid(Helix{}, 9)));
-  std::ofstream(in_folder("part.vtu")) << "a mesh";
-  ViewedScene viewed{in_folder("part.vtu"), {"receiver.resolution=[16,16]", "light.photons=1000"}, ""};
+  const std::filesystem::path mesh = in_folder("part.vtu");
+  write_bytes(mesh, "a mesh");
+  ViewedScene viewed{mesh, {"receiver.resolution=[16,16]", "light.photons=1000"}, ""};
   viewed.imported = in_folder("made.vdb");
-  test::Mailbox mailbox;
+  test::Mailbox page;
   Pages pages(viewed, progress_);
-  const Pages::Id page = pages.open(mailbox.sender());
-  const Json hello = mailbox.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
-  EXPECT_EQ(hello.at("file"), in_folder("part.vtu").string());
-  EXPECT_EQ(hello.at("scene").at("field").at("file"), in_folder("part.vtu").string());
+  page.open(pages);
+  const Json hello = page.hello(), scene = hello.at("scene");
+  EXPECT_EQ(hello.at("file"), mesh.string());
+  EXPECT_EQ(scene.at("field").at("file"), mesh.string());
   EXPECT_EQ(hello.at("field").at("voxels")[0], 9);
-  Json wrong = hello.at("scene");
+  Json wrong = scene, other = scene;
   wrong["light"]["photons"] = -1;
-  pages.receive(page, scene_message(1, wrong));
-  EXPECT_THAT(mailbox.wait("error", 1).json.at("message").get<std::string>(), HasSubstr("part.vtu"));
-  Json other = hello.at("scene");
   other["field"]["file"] = "other.vdb";
-  pages.receive(page, scene_message(4, other));
-  EXPECT_THAT(mailbox.wait("error", 4).json.at("message").get<std::string>(), HasSubstr("this view shows"));
-  pages.receive(page, scene_message(2, hello.at("scene")));
-  mailbox.final_picture(2);
-  pages.receive(page, Json{{"type", "export"}, {"id", 3}, {"file", "png"}}.dump());
-  EXPECT_EQ(mailbox.wait("file", 3).json.at("name"), "part.png");
-  for (const test::Received& message : mailbox.all())
-    EXPECT_EQ(message.json.dump().find("made.vdb"), std::string::npos) << message.json;
+  EXPECT_THAT(page.error(test::scene_message(1, wrong)), HasSubstr("part.vtu"));
+  EXPECT_THAT(page.error(test::scene_message(4, other)), HasSubstr("this view shows"));
+  page.final_picture(2, scene);
+  EXPECT_EQ(page.answer("file", {{"type", "export"}, {"id", 3}, {"file", "png"}}).json.at("name"), "part.png");
+  for (const test::Received& message : page.all()) EXPECT_THAT(message.json.dump(), Not(HasSubstr("made.vdb")));
 }
 
 TEST_F(PagesTest, RequestsWaitForTheSceneBeforeThem) {
   std::promise<Pages::Id> opened;
   std::future<Pages::Id> id = opened.get_future();
-  const Pages::Send send = other_mailbox_.sender();
+  const Pages::Send send = other_.sender();
   opened.set_value(pages_.open([this, &id, send](const PageMessage& message) {
     if (test::received(message).json.at("type") == "hello") {  // Its thread then looks for more requests.
       const Pages::Id page = id.get();
-      pages_.receive(page, scene_message(1, test::small_scene()));
+      pages_.receive(page, test::scene_message(1, test::small_scene()).dump());
       pages_.receive(page, Json{{"type", "space"}, {"id", 2}}.dump());
     }
     send(message);
   }));
-  const Json answer = other_mailbox_.wait([](const Json& json) { return json.value("id", Json()) == 2; }).json;
+  const Json answer = other_.wait({{"id", 2}}).json;
   EXPECT_EQ(answer.at("type"), "space") << answer;
 }
 
 TEST_F(PagesTest, PagesDoNotDisturbEachOther) {
-  const Pages::Id other = pages_.open(other_mailbox_.sender());
-  Json scene = test::small_scene();
-  scene["field"]["generate"]["kind"] = "two_point_load";
-  pages_.receive(other, scene_message(1, scene));
-  send_scene(1, test::small_scene());
-  const test::Received mine = mailbox_.final_picture(1), theirs = other_mailbox_.final_picture(1);
+  other_.open(pages_);
+  scene_["field"]["generate"]["kind"] = "two_point_load";
+  other_.send(test::scene_message(1, scene_));
+  const test::Received mine = page_.final_picture(1, test::small_scene()), theirs = other_.final_picture(1);
   EXPECT_NE(mine.bytes, theirs.bytes);
-  send_scene(2, test::small_scene());
-  EXPECT_EQ(mailbox_.final_picture(2).bytes, mine.bytes);
-  pages_.close(other);
-  send_scene(3, test::small_scene());
-  mailbox_.final_picture(3);
+  EXPECT_EQ(page_.final_picture(2, test::small_scene()).bytes, mine.bytes);
+  other_.close();
+  page_.final_picture(3, test::small_scene());
 }
 
 // The page of the live view in a real browser, with a real server: tools/viewer/page/test/page_test.mjs.
@@ -268,9 +229,8 @@ class Browser : public test::ViewTest {};
 
 TEST_F(Browser, ThePageFollowsItsUser) {
   const fs::path program(TENSORRAY_VIEW_PROGRAM), page = test::source_folder() / "tools" / "viewer" / "page";
-  if (!fs::exists(program.parent_path().parent_path() / "view" / "view.js"))
-    GTEST_SKIP() << "the page is not built (tools/viewer/page/build " << program.parent_path().parent_path() / "view"
-                 << ")";
+  const fs::path built = program.parent_path().parent_path() / "view";
+  if (!fs::exists(built / "view.js")) GTEST_SKIP() << "the page is not built (tools/viewer/page/build " << built << ")";
   if (!fs::exists(page / "node_modules" / "puppeteer-core")) GTEST_SKIP() << "puppeteer-core is not installed";
   if (!runs("node --version") || !runs("chromium --version")) GTEST_SKIP() << "node or chromium is not installed";
   const std::string command = "node '" + (page / "test" / "page_test.mjs").string() + "' '" + program.string() + "' '" +
@@ -284,24 +244,25 @@ class LiveSceneTest : public test::ViewTest {
  protected:
   std::vector<std::filesystem::path> outputs_{in_folder("p.png"), in_folder("p.exr")};
   Progress progress_;
+  LiveScene live_{scene_file()};
+  Json scene_ = test::small_scene();
 
   Image shown(LiveScene& live, const Json& scene) {
     live.load(scene, outputs_, progress_);
     return display_image(live.scene(), *live.render(progress_), false);
   }
-  Image shown_anew(const Json& scene) {
+  void expect_as_anew(const Json& scene) {
     LiveScene anew(scene_file());
-    return shown(anew, scene);
+    EXPECT_TRUE(shown(live_, scene).pixels == shown(anew, scene).pixels) << scene;
+    EXPECT_EQ(live_.scene().scale.scale, anew.scene().scale.scale) << scene;
   }
 };
 
 TEST_F(LiveSceneTest, PicturesAfterChangesAreThoseOfANewScene) {
-  LiveScene live(scene_file());
-  Json scene = test::small_scene();
-  std::vector<Json> versions{scene};
+  expect_as_anew(scene_);
   const auto change = [&](const char* pointer, const Json& value) {
-    scene[Json::json_pointer(pointer)] = value;
-    versions.push_back(scene);
+    scene_[Json::json_pointer(pointer)] = value;
+    expect_as_anew(scene_);
   };
   change("/output", {{"exposure", 1}});
   change("/receiver/distance", 0.7);
@@ -322,68 +283,56 @@ TEST_F(LiveSceneTest, PicturesAfterChangesAreThoseOfANewScene) {
   const Json few{{"rays", 1024}, {"passes", 1}, {"resolution", 32}};
   change("/integrator", {{"type", "scene"}, {"max_samples", 1}, {"min_samples", 1}, {"caustic", few}});
   change("/camera/direction", {1, 0, 0});
-  versions.push_back(test::small_scene());
-  for (const Json& version : versions) {
-    LiveScene anew(scene_file());
-    const Image picture = shown(live, version), expected = shown(anew, version);
-    ASSERT_EQ(picture.pixels, expected.pixels) << version;
-    EXPECT_EQ(live.scene().scale.scale, anew.scene().scale.scale);
-  }
+  expect_as_anew(test::small_scene());
 }
 
 TEST_F(LiveSceneTest, ARecolouredPictureIsNotRenderedAgain) {
-  LiveScene live(scene_file());
-  Json scene = test::small_scene();
-  shown(live, scene);
-  const auto render = live.render(progress_);
-  scene["output"]["exposure"] = 2;
-  EXPECT_TRUE(live.has_picture(scene, outputs_));
-  live.load(scene, outputs_, progress_);
-  EXPECT_EQ(live.render(progress_), render);
-  scene["receiver"]["distance"] = 0.5;
-  EXPECT_FALSE(live.has_picture(scene, outputs_));
-  live.load(scene, outputs_, progress_);
-  EXPECT_NE(live.render(progress_), render);
+  shown(live_, scene_);
+  const auto render = live_.render(progress_);
+  scene_["output"]["exposure"] = 2;
+  EXPECT_TRUE(live_.has_picture(scene_, outputs_));
+  live_.load(scene_, outputs_, progress_);
+  EXPECT_EQ(live_.render(progress_), render);
+  scene_["receiver"]["distance"] = 0.5;
+  EXPECT_FALSE(live_.has_picture(scene_, outputs_));
+  live_.load(scene_, outputs_, progress_);
+  EXPECT_NE(live_.render(progress_), render);
 }
 
 TEST_F(LiveSceneTest, StaysAsItWasWhereASceneIsWrong) {
-  LiveScene live(scene_file());
-  Json scene = test::small_scene();
-  const Image before = shown(live, scene);
-  const float* const voxels = live.scene().field.brick({0, 0, 0}).bending;
-  Json wrong = scene;
+  const Image before = shown(live_, scene_);
+  const float* const voxels = live_.scene().field.brick({0, 0, 0}).bending;
+  Json wrong = scene_;
   wrong["receiver"]["size"] = {1e30, 1};
-  EXPECT_THROW(live.load(wrong, outputs_, progress_), SceneError);
+  EXPECT_THROW(live_.load(wrong, outputs_, progress_), SceneError);
   wrong["receiver"] = {{"unknown", 1}};
-  EXPECT_THROW(live.load(wrong, outputs_, progress_), SceneError);
+  EXPECT_THROW(live_.load(wrong, outputs_, progress_), SceneError);
   // With another field, loading begins anew.
-  wrong = scene;
+  wrong = scene_;
   wrong["field"] = {{"file", "missing.vdb"}};
-  EXPECT_THROW(live.load(wrong, outputs_, progress_), std::runtime_error);
-  EXPECT_EQ(live.scene().field.brick({0, 0, 0}).bending, voxels);
-  EXPECT_TRUE(live.has_picture(scene, outputs_));
+  EXPECT_THROW(live_.load(wrong, outputs_, progress_), std::runtime_error);
+  EXPECT_EQ(live_.scene().field.brick({0, 0, 0}).bending, voxels);
+  EXPECT_TRUE(live_.has_picture(scene_, outputs_));
   wrong["field"] = {{"generate", {{"kind", "vortex"}, {"resolution", 12}}}, {"scale", "auto"}};
   progress_.cancelled = true;
-  EXPECT_THROW(live.load(wrong, outputs_, progress_), Cancelled);
+  EXPECT_THROW(live_.load(wrong, outputs_, progress_), Cancelled);
   progress_.cancelled = false;
-  EXPECT_EQ(shown(live, scene).pixels, before.pixels);
-  EXPECT_EQ(live.scene().field.brick({0, 0, 0}).bending, voxels);
+  EXPECT_EQ(shown(live_, scene_).pixels, before.pixels);
+  EXPECT_EQ(live_.scene().field.brick({0, 0, 0}).bending, voxels);
 }
 
 TEST_F(LiveSceneTest, ThePolariscopeTracesOnceForAllArrangements) {
-  LiveScene live(scene_file());
-  Json scene = test::small_scene();
-  scene["integrator"] = {{"type", "polariscope"}};
-  shown(live, scene);
-  const auto kept = live.scene().kept;
+  scene_["integrator"] = {{"type", "polariscope"}};
+  shown(live_, scene_);
+  const auto kept = live_.scene().kept;
   for (const double angle : {10.0, 40.0}) {
-    scene["integrator"]["analyzer"] = angle;
-    EXPECT_EQ(shown(live, scene).pixels, shown_anew(scene).pixels) << angle;
-    EXPECT_EQ(live.scene().kept, kept);
+    scene_["integrator"]["analyzer"] = angle;
+    expect_as_anew(scene_);
+    EXPECT_EQ(live_.scene().kept, kept);
   }
-  scene["field"]["generate"]["resolution"] = 9;
-  EXPECT_EQ(shown(live, scene).pixels, shown_anew(scene).pixels);
-  EXPECT_NE(live.scene().kept, kept);
+  scene_["field"]["generate"]["resolution"] = 9;
+  expect_as_anew(scene_);
+  EXPECT_NE(live_.scene().kept, kept);
 }
 
 }  // namespace

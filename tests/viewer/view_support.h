@@ -3,13 +3,12 @@
 
 #include <condition_variable>
 #include <cstring>
-#include <fstream>
 #include <mutex>
 #include <optional>
 #include <thread>
 
 #include "base/files/temporary_folder.h"
-#include "tests/names.h"
+#include "tests/files.h"
 #include "tools/viewer/pages.h"
 #include "tools/viewer/server/server.h"
 
@@ -24,7 +23,7 @@ inline Json small_scene() {
 
 class ViewFolder {
  public:
-  ViewFolder() { std::ofstream(scene_file()) << small_scene(); }
+  ViewFolder() { write_bytes(scene_file(), small_scene().dump()); }
 
   std::filesystem::path in_folder(const std::string& name) const { return folder_ / name; }
   std::filesystem::path scene_file() const { return in_folder("scene.json"); }
@@ -38,8 +37,8 @@ class ViewFolder {
 class RunningView : public ViewFolder {
  public:
   explicit RunningView(ServerSettings settings) {
-    for (const char* file : {"index.html", "view.js", "view.css"})
-      std::ofstream(in_folder(file)) << "content of " << file;
+    for (const std::string name : {"index.html", "view.js", "view.css"})
+      write_bytes(in_folder(name), "content of " + name);
     settings.page = in_folder("");
     pages_.emplace(viewed(), progress_);
     server_.emplace(settings, *pages_);
@@ -78,6 +77,9 @@ inline Received received(const PageMessage& message) {
 
 class ViewTest : public ::testing::Test, protected ViewFolder {};
 
+inline Json scene_message(int id, const Json& scene) { return {{"type", "scene"}, {"id", id}, {"scene", scene}}; }
+
+/// What a page gets. It must not end before the Pages, whose thread sends to it.
 class Mailbox {
  public:
   Pages::Send sender() {
@@ -88,30 +90,44 @@ class Mailbox {
     };
   }
 
-  /// The first message that `wanted` accepts; it waits for it.
-  template <class Wanted>
-  Received wait(const Wanted& wanted) {
+  /// The first message that has these members; it waits for it.
+  Received wait(const Json& members) {
+    const auto has_them = [&](const Received& message) {
+      Json changed = message.json;
+      changed.update(members);
+      return changed == message.json;
+    };
     std::unique_lock<std::mutex> lock(mutex_);
-    Received result;
+    auto found = messages_.end();
     arrived_.wait(lock, [&] {
-      for (const Received& message : messages_)
-        if (wanted(message.json)) {
-          result = message;
-          return true;
-        }
-      return false;
+      found = std::find_if(messages_.begin(), messages_.end(), has_them);
+      return found != messages_.end();
     });
-    return result;
+    return *found;
   }
 
-  Received wait(const std::string& type, int id) {
-    return wait([&](const Json& json) { return json.value("type", "") == type && json.value("id", Json()) == id; });
-  }
+  Json hello() { return wait({{"type", "hello"}}).json; }
+  Received wait(const std::string& type, int id) { return wait({{"type", type}, {"id", id}}); }
+  Received final_picture(int id) { return wait({{"type", "picture"}, {"id", id}, {"final", true}}); }
 
-  Received final_picture(int id) {
-    return wait([&](const Json& json) {
-      return json.value("type", "") == "picture" && json.value("id", Json()) == id && json.value("final", false);
-    });
+  /// Opens the page whose messages come here, and for which the following functions send.
+  void open(Pages& pages) {
+    pages_ = &pages;
+    page_ = pages.open(sender());
+  }
+  void close() { pages_->close(page_); }
+  void send_text(const std::string& text) { pages_->receive(page_, text); }
+  void send(const Json& message) { send_text(message.dump()); }
+
+  /// Sends a message and waits for the answer of this type.
+  Received answer(const std::string& type, const Json& message) {
+    send(message);
+    return wait(type, message.at("id"));
+  }
+  std::string error(const Json& message) { return answer("error", message).json.at("message"); }
+  Received final_picture(int id, const Json& scene) {
+    send(scene_message(id, scene));
+    return final_picture(id);
   }
 
   std::vector<Received> all() {
@@ -123,6 +139,8 @@ class Mailbox {
   std::mutex mutex_;
   std::condition_variable arrived_;
   std::vector<Received> messages_;
+  Pages* pages_ = nullptr;
+  Pages::Id page_ = 0;
 };
 
 }  // namespace tensorray::test

@@ -12,6 +12,8 @@
 namespace tensorray {
 namespace {
 
+using testing::Each;
+
 Vector2d uniform(int i) { return {random_uniform(11, i, 0), random_uniform(11, i, 1)}; }
 
 /// The score of the pairs (first(i), second(i)), which are uniform only if both are uniform and independent.
@@ -24,9 +26,8 @@ double turn(double x, double y) { return std::atan2(y, x) / (2 * pi) + 0.5; }
 
 TEST(PathSampler, SingleNumbersAreStratified) {
   std::vector<int> counts(256);
-  for (std::uint32_t sample = 0; sample < 256; ++sample)
-    ++counts[static_cast<int>(PathSampler{3, 4, sample, 9}.next_1d() * 256)];
-  for (const int count : counts) EXPECT_EQ(count, 1);
+  for (std::uint32_t i = 0; i < 256; ++i) ++counts[static_cast<int>(PathSampler{3, 4, i, 9}.next_1d() * 256)];
+  EXPECT_THAT(counts, Each(1));
 }
 
 /// Some of the pairs that a sample has without dimensions.
@@ -47,9 +48,7 @@ TEST(PathSampler, NumbersOfSurfacesAreEvenAndUnrelated) {
         return Vector2d(pair_of(pixel, sample, number).x(), pair_of(pixel, sample, other).x());
       };
       const bool are_twins = number % 2 == 0 && other == number - 1;  // Of one point, so related within a pixel.
-      if (!are_twins) {
-        EXPECT_LT(square_score([&](int i) { return both(3, i); }), 5.5) << number << " " << other;
-      }
+      EXPECT_TRUE(are_twins || square_score([&](int i) { return both(3, i); }) < 5.5) << number << " " << other;
       EXPECT_LT(std::abs(square_score([&](int i) { return both(static_cast<std::uint64_t>(i), 0); })), 4.5);
     }
   }
@@ -61,12 +60,13 @@ TEST(PathSampler, DimensionsAndPixelsAreUnrelated) {
   };
   const auto pair = [](int i) { return PathSampler{5, static_cast<std::uint64_t>(i), 0}.next_2d(); };
   // Each number alone is stratified. This leaves 31 * 31 of 1023 degrees of freedom: 1.4 standard deviations less.
-  EXPECT_LT(std::abs(pair_score([&](int i) { return number(0, i, 0); }, [&](int i) { return number(0, i, 1); })), 5.5);
-  EXPECT_LT(std::abs(pair_score([&](int i) { return number(0, i, 0); }, [&](int i) { return number(1, i, 0); })), 5.5);
+  const auto of_sample = [&](int i) { return number(0, i, 0); };
+  EXPECT_LT(std::abs(pair_score(of_sample, [&](int i) { return number(0, i, 1); })), 5.5);
+  EXPECT_LT(std::abs(pair_score(of_sample, [&](int i) { return number(1, i, 0); })), 5.5);
   // The first sample of each pixel, and two of its dimensions.
-  EXPECT_LT(std::abs(pair_score([&](int i) { return number(i, 0, 0); }, [&](int i) { return number(i, 0, 1); })), 4);
-  EXPECT_LT(std::abs(pair_score([&](int i) { return number(i, 0, 0); }, [&](int i) { return number(i + 1, 0, 0); })),
-            4);
+  const auto of_pixel = [&](int i) { return number(i, 0, 0); };
+  EXPECT_LT(std::abs(pair_score(of_pixel, [&](int i) { return number(i, 0, 1); })), 4);
+  EXPECT_LT(std::abs(pair_score(of_pixel, [&](int i) { return number(i + 1, 0, 0); })), 4);
   EXPECT_LT(std::abs(square_score(pair)), 4);
 }
 
@@ -75,9 +75,9 @@ TEST(FrameAbout, IsRightHandedAndOrthonormal) {
     Vector3d axis = square_to_sphere(uniform(i));
     if (i < 6) axis = (i % 2 ? -1 : 1) * Vector3d::Unit(i / 2);
     if (i == 6) axis = Vector3d(1e-9, -1e-9, -1).normalized();
-    const Eigen::Matrix3d frame = frame_about(axis);
+    const Matrix3d frame = frame_about(axis);
     EXPECT_EQ(frame.col(2), axis);
-    EXPECT_LT((frame.transpose() * frame - Eigen::Matrix3d::Identity()).norm(), 1e-14);
+    EXPECT_LT((frame.transpose() * frame - Matrix3d::Identity()).norm(), 1e-14);
     EXPECT_GT(frame.determinant(), 0);
   }
 }
@@ -85,9 +85,8 @@ TEST(FrameAbout, IsRightHandedAndOrthonormal) {
 TEST(CircleAt, IsCosineAndSine) {
   for (int i = -20000; i <= 20000; ++i) {
     const double turn = i / 10000.0;
-    const Vector2d at = circle_at(turn);
-    EXPECT_NEAR(at.x(), std::cos(2 * pi * turn), 2e-15) << turn;
-    EXPECT_NEAR(at.y(), std::sin(2 * pi * turn), 2e-15) << turn;
+    const Vector2d exact(std::cos(2 * pi * turn), std::sin(2 * pi * turn));
+    EXPECT_LE((circle_at(turn) - exact).cwiseAbs().maxCoeff(), 2e-15) << turn;
   }
 }
 
@@ -98,8 +97,7 @@ TEST(Choose, LeavesAnEvenNumber) {
     for (int i = 0; i < count; ++i) {
       double u = (i + 0.5) / count;
       const bool chosen = choose(share, u);
-      ASSERT_GE(u, 0);
-      ASSERT_LT(u, 1);
+      ASSERT_TRUE(u >= 0 && u < 1) << u;
       ++bins[chosen][static_cast<std::size_t>(10 * u)];
     }
     for (const bool chosen : {false, true})
@@ -110,11 +108,11 @@ TEST(Choose, LeavesAnEvenNumber) {
 // The textbook inverse of each warp must return a uniform square.
 
 TEST(Warps, DiskIsEven) {
-  EXPECT_LT(std::abs(square_score([](int i) {
-              const Vector2d p = square_to_disk(uniform(i));
-              return Vector2d(p.squaredNorm(), turn(p.x(), p.y()));
-            })),
-            4);
+  const auto inverse = [](int i) {
+    const Vector2d p = square_to_disk(uniform(i));
+    return Vector2d(p.squaredNorm(), turn(p.x(), p.y()));
+  };
+  EXPECT_LT(std::abs(square_score(inverse)), 4);
   EXPECT_EQ(square_to_disk({0.5, 0.5}), Vector2d::Zero());
   for (const Vector2d& edge : {Vector2d(0, 0), Vector2d(0, 0.3), Vector2d(0.7, 0), Vector2d(1, 1), Vector2d(0.2, 1)})
     EXPECT_NEAR(square_to_disk(edge).norm(), 1, 1e-15);
@@ -122,15 +120,14 @@ TEST(Warps, DiskIsEven) {
 
 TEST(Warps, Cone) {
   for (const double angle : {pi, 1.0, 0.1, 0.00465, 1e-7}) {
-    EXPECT_LT(std::abs(square_score([angle](int i) {
-                const Vector3d d = square_to_cone(uniform(i), angle);
-                // sin²(θ/2) relative to its largest value, computed from sin θ if θ is small.
-                const double sine = std::hypot(d.x(), d.y());
-                const double half = d.z() > 0 ? std::asin(sine) / 2 : (pi - std::asin(sine)) / 2;
-                return Vector2d(std::pow(std::sin(half) / std::sin(angle / 2), 2), turn(d.x(), d.y()));
-              })),
-              4)
-        << angle;
+    const auto inverse = [angle](int i) {
+      const Vector3d d = square_to_cone(uniform(i), angle);
+      // sin²(θ/2) relative to its largest value, computed from sin θ if θ is small.
+      const double sine = std::hypot(d.x(), d.y());
+      const double half = d.z() > 0 ? std::asin(sine) / 2 : (pi - std::asin(sine)) / 2;
+      return Vector2d(std::pow(std::sin(half) / std::sin(angle / 2), 2), turn(d.x(), d.y()));
+    };
+    EXPECT_LT(std::abs(square_score(inverse)), 4) << angle;
   }
   EXPECT_NEAR(cone_solid_angle(pi), 4 * pi, 1e-14);
   EXPECT_NEAR(cone_solid_angle(pi / 2), 2 * pi, 1e-14);
@@ -150,42 +147,16 @@ TEST(RandomUniformTest, KeysAreIndependent) {
 
 TEST(SobolTest, PairsAreItsFirstDimensions) {
   for (const std::uint64_t seed : {0u, 1u, 12345u})
-    for (const std::uint32_t index : {0u, 1u, 2u, 77u, 4096u, 3000000000u, 0xffffffffu}) {
-      const auto [x, y] = sobol_pair(seed, index);
-      EXPECT_EQ(x, sobol(seed, index, 0));
-      EXPECT_EQ(y, sobol(seed, index, 1));
-    }
+    for (const std::uint32_t index : {0u, 1u, 2u, 77u, 4096u, 3000000000u, 0xffffffffu})
+      EXPECT_EQ(sobol_pair(seed, index), (std::array{sobol(seed, index, 0), sobol(seed, index, 1)})) << index;
 }
 
-TEST(SobolTest, FirstPointsFillEveryElementaryInterval) {
-  for (const std::uint64_t seed : {0u, 1u, 12345u})
-    for (int k = 0; k <= 10; ++k)
-      for (int i = 0; i <= k; ++i) {
-        std::vector<int> counts(1 << k);
-        for (int index = 0; index < (1 << k); ++index) {
-          const int column = static_cast<int>(std::ldexp(sobol(seed, index, 0), i));
-          const int row = static_cast<int>(std::ldexp(sobol(seed, index, 1), k - i));
-          ++counts[(column << (k - i)) + row];
-        }
-        for (const int count : counts)
-          ASSERT_EQ(count, 1) << "seed " << seed << ", 2^" << k << " points, column bits " << i;
-      }
-}
-
-/// The coordinates of a joint point, with one of its twins.
-std::array<double, 4> joint_point(std::uint64_t key, int index, bool second) {
-  const auto i = static_cast<std::uint32_t>(index);
-  const auto [x, y] = joint_sobol_start(key, i);
-  const SobolTwins twins = joint_sobol_twins(key + 1, i);
-  const auto [z, w] = second ? twins.second : twins.first;
-  return {x, y, z, w};
-}
-
-/// Whether each box of 2^-bits[0] × … has as many of the first 2^k joint points.
-bool is_even(int k, const std::array<int, 4>& bits, bool second) {
+/// Whether each box of 2^-bits[0] × … has as many of the first 2^k points.
+template <class Point>
+bool is_even(int k, const std::array<int, 4>& bits, const Point& point_of) {
   std::vector<int> counts(std::size_t{1} << (bits[0] + bits[1] + bits[2] + bits[3]));
   for (int index = 0; index < (1 << k); ++index) {
-    const std::array<double, 4> point = joint_point(77, index, second);
+    const std::array<double, 4> point = point_of(index);
     std::size_t box = 0;
     for (std::size_t axis = 0; axis < 4; ++axis)
       box = (box << bits[axis]) + static_cast<std::size_t>(std::ldexp(point[axis], bits[axis]));
@@ -194,16 +165,35 @@ bool is_even(int k, const std::array<int, 4>& bits, bool second) {
   return std::all_of(counts.begin(), counts.end(), [&](int count) { return count == counts[0]; });
 }
 
+TEST(SobolTest, FirstPointsFillEveryElementaryInterval) {
+  for (const std::uint64_t seed : {0u, 1u, 12345u}) {
+    const auto point = [&](int index) { return std::array{sobol(seed, index, 0), sobol(seed, index, 1), 0.0, 0.0}; };
+    for (int k = 0; k <= 10; ++k)
+      for (int i = 0; i <= k; ++i)
+        ASSERT_TRUE(is_even(k, {i, k - i, 0, 0}, point))
+            << "seed " << seed << ", 2^" << k << " points, column bits " << i;
+  }
+}
+
 TEST(SobolTest, FourDimensionsAreStratifiedTogether) {
-  for (const bool second : {false, true})
+  for (const bool second : {false, true}) {
+    // A joint point, with one of its twins.
+    const auto point = [second](int index) {
+      const auto i = static_cast<std::uint32_t>(index);
+      const auto [x, y] = joint_sobol_start(77, i);
+      const SobolTwins twins = joint_sobol_twins(78, i);
+      const auto [z, w] = second ? twins.second : twins.first;
+      return std::array<double, 4>{x, y, z, w};
+    };
     for (int k = 2; k <= 10; ++k) {
       const int bits = k - (k <= 7 ? 2 : 3);
       for (int a = 0; a <= bits; ++a)
         for (int b = 0; a + b <= bits; ++b)
           for (int c = 0; a + b + c <= bits; ++c)
-            EXPECT_TRUE(is_even(k, {a, b, c, bits - a - b - c}, second)) << k << ": " << a << " " << b << " " << c;
-      for (int a = 0; a <= k; ++a) EXPECT_TRUE(is_even(k, {a, k - a, 0, 0}, second)) << k << ": " << a;
+            EXPECT_TRUE(is_even(k, {a, b, c, bits - a - b - c}, point)) << k << ": " << a << " " << b << " " << c;
+      for (int a = 0; a <= k; ++a) EXPECT_TRUE(is_even(k, {a, k - a, 0, 0}, point)) << k << ": " << a;
     }
+  }
 }
 
 TEST(SobolTest, TwinsAreUncorrelated) {

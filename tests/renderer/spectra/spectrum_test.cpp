@@ -2,10 +2,7 @@
 
 #include <cstdlib>
 #include <fstream>
-#include <limits>
 #include <stdexcept>
-
-#include <Eigen/LU>
 
 #include "renderer/color/color.h"
 #include "renderer/spectra/reflectance.h"
@@ -15,16 +12,11 @@
 namespace tensorray {
 namespace {
 
-/// The chromaticity of a light over the whole range of the observer.
-Eigen::Vector2d chromaticity(const Spectrum& light, int count = 1) {
-  Eigen::Vector3d xyz = Eigen::Vector3d::Zero();
-  for (const Band& band : make_bands(light, observer_min, observer_max, count)) xyz += band.xyz;
-  return xyz.head<2>() / xyz.sum();
-}
-
-void expect_near(const Eigen::Vector2d& actual, double x, double y, double tolerance) {
-  EXPECT_NEAR(actual.x(), x, tolerance);
-  EXPECT_NEAR(actual.y(), y, tolerance);
+/// Of a light over the whole range of the observer.
+void expect_chromaticity(const Spectrum& light, double x, double y, double tolerance) {
+  const Vector3d xyz = make_bands(light, observer_min, observer_max, 1).front().xyz;
+  EXPECT_NEAR(xyz.x() / xyz.sum(), x, tolerance);
+  EXPECT_NEAR(xyz.y() / xyz.sum(), y, tolerance);
 }
 
 TEST(SpectrumTest, IsLinearBetweenSamplesAndZeroOutside) {
@@ -46,27 +38,24 @@ TEST(ObserverTest, EqualsTheReferenceTable) {
   char comma = 0;
   int rows = 0;
   for (; file >> wavelength >> comma >> x >> comma >> y >> comma >> z; ++rows)
-    EXPECT_EQ(observer(wavelength), Eigen::Vector3d(x, y, z)) << wavelength;
+    EXPECT_EQ(observer(wavelength), Vector3d(x, y, z)) << wavelength;
   EXPECT_EQ(rows, 471);
 }
 
-TEST(IlluminantTest, WhitePoints) {
-  expect_near(chromaticity(illuminant("D65")), 0.3127, 0.3290, 1e-4);
-  expect_near(chromaticity(illuminant("A")), 0.4476, 0.4074, 1e-4);
-  expect_near(chromaticity(illuminant("E")), 1 / 3.0, 1 / 3.0, 1e-4);
+TEST(SpectrumTest, LightsHaveTheirChromaticities) {
+  expect_chromaticity(illuminant("D65"), 0.3127, 0.3290, 1e-4);
+  expect_chromaticity(illuminant("A"), 0.4476, 0.4074, 1e-4);
+  expect_chromaticity(illuminant("E"), 1 / 3.0, 1 / 3.0, 1e-4);
+  // Of the Planckian locus (CIE 1931).
+  expect_chromaticity(blackbody(6500), 0.3135, 0.3237, 2e-4);
+  expect_chromaticity(blackbody(5000), 0.3451, 0.3516, 2e-4);
+  expect_chromaticity(blackbody(2856), 0.4476, 0.4074, 2e-4);
+  expect_chromaticity(blackbody(2000), 0.5267, 0.4133, 2e-4);
 }
 
 TEST(IlluminantTest, KnowsItsNames) {
   for (const std::string& name : illuminant_names()) EXPECT_DOUBLE_EQ(illuminant(name).at(560), 100) << name;
   EXPECT_THAT(message([] { illuminant("D50"); }), HasSubstr("\"D50\"; known: D65, E, A"));
-}
-
-TEST(BlackbodyTest, Chromaticities) {
-  // Of the Planckian locus (CIE 1931).
-  expect_near(chromaticity(blackbody(6500)), 0.3135, 0.3237, 2e-4);
-  expect_near(chromaticity(blackbody(5000)), 0.3451, 0.3516, 2e-4);
-  expect_near(chromaticity(blackbody(2856)), 0.4476, 0.4074, 2e-4);
-  expect_near(chromaticity(blackbody(2000)), 0.5267, 0.4133, 2e-4);
 }
 
 TEST(BlackbodyTest, FollowsPlanckAtAllTemperatures) {
@@ -90,8 +79,7 @@ TEST(BandsTest, SumsHoldForEveryCount) {
           power += band.power;
           luminance += band.xyz.y();
           width += band.width;
-          EXPECT_GT(band.wavelength, low);
-          EXPECT_LT(band.wavelength, high);
+          EXPECT_TRUE(band.wavelength > low && band.wavelength < high) << band.wavelength;
         }
         EXPECT_NEAR(power, 1, 1e-12);
         EXPECT_NEAR(luminance, 1, 1e-12);
@@ -103,19 +91,17 @@ TEST(BandsTest, EqualsAFineSum) {
   // Midpoint rule with steps of 1e-3 nm; its error is second order, and first order only at jumps of the light.
   const Spectrum light{{450.25, 500, 612.5}, {1, 4, 2}};
   const std::vector<Band> bands = make_bands(light, 430, 650, 3);
-  double total = 0, total_y = 0;
-  std::vector<double> power(3), z(3);
+  Vector3d power(0, 0, 0);
+  Matrix3d xyz = Matrix3d::Zero();
   for (int i = 0; i < 220000; ++i) {
     const double wavelength = 430 + (i + 0.5) * 1e-3;
     const int band = i * 3 / 220000;
     power[band] += light.at(wavelength);
-    z[band] += light.at(wavelength) * observer(wavelength).z();
-    total += light.at(wavelength);
-    total_y += light.at(wavelength) * observer(wavelength).y();
+    xyz.col(band) += light.at(wavelength) * observer(wavelength);
   }
   for (int band = 0; band < 3; ++band) {
-    EXPECT_NEAR(bands[band].power, power[band] / total, 1e-5);
-    EXPECT_NEAR(bands[band].xyz.z(), z[band] / total_y, 1e-5);
+    EXPECT_NEAR(bands[band].power, power[band] / power.sum(), 1e-5);
+    EXPECT_LT((bands[band].xyz - xyz.col(band) / xyz.row(1).sum()).cwiseAbs().maxCoeff(), 1e-5);
   }
 }
 
@@ -129,17 +115,13 @@ TEST(BandsTest, MonochromaticLight) {
 }
 
 TEST(ReadSpectrumTest, ReadsColumns) {
-  const std::vector<std::string> contents{
-      "400 1\n500 2.5e0\n600 0\n",
-      "# a lamp\nwavelength_nm,power\n400,1\n\n500, +2.5 # peak\r\n600,0",
-      "\xEF\xBB\xBFnm;value\r\n400;1\r\n500;2.5\r\n600;0\r\n",
-      "  400\t1\n\t500\t2.50\n600 0\n",
-  };
-  for (const std::string& content : contents) {
+  for (const std::string content :
+       {"400 1\n500 2.5e0\n600 0\n", "# a lamp\nwavelength_nm,power\n400,1\n\n500, +2.5 # peak\r\n600,0",
+        "\xEF\xBB\xBFnm;value\r\n400;1\r\n500;2.5\r\n600;0\r\n", "  400\t1\n\t500\t2.50\n600 0\n"}) {
     const Temporary file("good.csv", content);
-    const Spectrum spectrum = read_spectrum(file.path());
-    EXPECT_EQ(spectrum.wavelengths, (std::vector<double>{400, 500, 600})) << content;
-    EXPECT_EQ(spectrum.values, (std::vector<double>{1, 2.5, 0})) << content;
+    const Spectrum spectrum = read_spectrum(file);
+    EXPECT_THAT(spectrum.wavelengths, ElementsAre(400, 500, 600)) << content;
+    EXPECT_THAT(spectrum.values, ElementsAre(1, 2.5, 0)) << content;
   }
 }
 
@@ -159,7 +141,7 @@ TEST(ReadSpectrumTest, ErrorsNameFileLineAndMend) {
            {"400 nan\n", "line 1: the value must be finite and not negative"},
            {"-400 1\n", "line 1: the wavelength must be above 0"}}) {
     const Temporary file("bad.csv", content);
-    EXPECT_THAT(message([&] { read_spectrum(file.path()); }), AllOf(HasSubstr(file.path().string()), HasSubstr(error)));
+    EXPECT_THAT(message([&] { read_spectrum(file); }), AllOf(HasSubstr(file.string()), HasSubstr(error)));
   }
   EXPECT_THAT(message([] { read_spectrum("/no/such.csv"); }), HasSubstr("/no/such.csv: no such file"));
   EXPECT_THAT(message([] { read_spectrum(::testing::TempDir()); }), HasSubstr("folder"));
@@ -211,35 +193,25 @@ std::vector<Vector3d> cube(int steps, double least = 0, double most = 1) {
   return colors;
 }
 
-/// CIE 1976 L*a*b* of linear Rec.709, relative to its white.
-Vector3d lab(const Matrix3d& rgb_to_xyz, const Vector3d& rgb) {
-  const Vector3d relative = (rgb_to_xyz * rgb).cwiseQuotient(rgb_to_xyz * Vector3d::Ones());
-  const Vector3d f =
-      relative.unaryExpr([](double t) { return t > 216.0 / 24389 ? std::cbrt(t) : (24389.0 / 27 * t + 16) / 116; });
-  return {116 * f.y() - 16, 500 * (f.x() - f.y()), 200 * (f.y() - f.z())};
-}
-
 /// The smallest distance to a colour that any reflectances of the bands within [0, 1], smooth or not, can reach. A
 /// convex problem, solved by optimising one band after the other.
 double min_distance(const Scene& scene, const Vector3d& rgb) {
   std::vector<double> reflectances(scene.bands.size(), 0);
   Vector3d residual = -rgb;
-  for (double before = std::numeric_limits<double>::max(); residual.norm() < before - 1e-7;) {
+  for (double before = INFINITY; residual.norm() < before - 1e-7;) {
     before = residual.norm();
     for (int sweep = 0; sweep < 100; ++sweep)
       for (std::size_t k = 0; k < scene.bands.size(); ++k) {
         const Vector3d color = scene.xyz_to_rgb * scene.bands[k].xyz;
-        const double value = reflectances[k] - color.dot(residual) / color.squaredNorm();
-        const double clamped = std::clamp(value, 0.0, 1.0);
-        residual += (clamped - reflectances[k]) * color;
-        reflectances[k] = clamped;
+        const double last = reflectances[k];
+        reflectances[k] = std::clamp(last - color.dot(residual) / color.squaredNorm(), 0.0, 1.0);
+        residual += (reflectances[k] - last) * color;
       }
   }
   return residual.norm();
 }
 
 TEST(ReflectanceTest, ColorsComeBack) {
-  const Matrix3d rgb_to_xyz = rec709().xyz_to_working().inverse();
   for (const Spectrum& light : {illuminant("D65"), illuminant("A"), illuminant("E"), blackbody(5500)})
     for (const int count : {10, 16, 32, 70}) {
       const Scene scene = make_scene(light, count);
@@ -247,7 +219,6 @@ TEST(ReflectanceTest, ColorsComeBack) {
         const Vector3d result = scene.color(scene.model.spectrum(rgb));
         // OpenColorIO's matrices, and therefore the white, are in single precision.
         ASSERT_LT((result - rgb).norm(), 3e-7) << light.at(400) << ", " << count << " bands: " << rgb.transpose();
-        ASSERT_LT((lab(rgb_to_xyz, result) - lab(rgb_to_xyz, rgb)).norm(), 0.1) << rgb.transpose();
       }
     }
 }
@@ -301,10 +272,9 @@ TEST(ReflectanceTest, GreyIsConstant) {
 
 TEST(ReflectanceTest, NegativeIsZeroAndWhatIsNotFiniteIsBlack) {
   const Scene scene = make_scene(illuminant("D65"), 16);
-  const double infinity = std::numeric_limits<double>::infinity();
   EXPECT_EQ(scene.model.spectrum({-1, 0.5, 0.2}).coefficients, scene.model.spectrum({0, 0.5, 0.2}).coefficients);
-  for (const Vector3d& black : {Vector3d(0, -1, -2), Vector3d(std::nan(""), 1, 1), Vector3d(0.2, infinity, 0),
-                                Vector3d(0.2, 0.1, std::nan("")), Vector3d(-infinity, 1, 1)})
+  for (const Vector3d& black : {Vector3d(0, -1, -2), Vector3d(NAN, 1, 1), Vector3d(0.2, INFINITY, 0),
+                                Vector3d(0.2, 0.1, NAN), Vector3d(-INFINITY, 1, 1)})
     EXPECT_EQ(scene.model.spectrum(black).at(555), 0) << black.transpose();
 }
 
