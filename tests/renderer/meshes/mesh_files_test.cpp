@@ -54,9 +54,9 @@ TEST(MeshFilesTest, PlyHoldsAttributes) {
   write_mesh(file, sample.mesh, sample.attributes());
   std::string expected =
       "ply\nformat binary_little_endian 1.0\nelement vertex 12\nproperty float x\nproperty float y\nproperty float z\n"
-      "property float nx\nproperty float ny\nproperty float nz\nproperty float force\nproperty uchar red\nproperty "
-      "uchar "
-      "green\nproperty uchar blue\nelement face 8\nproperty list uchar uint vertex_indices\nend_header\n";
+      "property float nx\nproperty float ny\nproperty float nz\nproperty float force\nproperty uchar red\n"
+      "property uchar green\nproperty uchar blue\nelement face 8\nproperty list uchar uint vertex_indices\n"
+      "end_header\n";
   const auto append = [&](const auto* numbers, std::size_t count) {
     expected.append(reinterpret_cast<const char*>(numbers), count * sizeof *numbers);
   };
