@@ -27,13 +27,13 @@ TEST(Mirror, GivesTheWholeFieldOnAllLevels) {
   for (const int axis : {0, 1, 2})
     for (const double shift : {0.0, 0.25})
       for (const int side : {1, -1}) {
-        Eigen::Affine3d to_world(Eigen::Scaling(0.5));
+        Affine3d to_world(Eigen::Scaling(0.5));
         to_world.translation()[axis] = shift;
         const Formula value = [&](const Vector3d& index) { return symmetric_field(to_world * index, axis); };
-        Eigen::AlignedBox3i whole(Vector3i::Constant(-8), Vector3i::Constant(7));
+        AlignedBox3i whole(Vector3i::Constant(-8), Vector3i::Constant(7));
         whole.min()[axis] = -16;
         whole.max()[axis] = shift == 0 ? 16 : 15;
-        Eigen::AlignedBox3i half = whole;
+        AlignedBox3i half = whole;
         (side > 0 ? half.min() : half.max())[axis] = side < 0 && shift != 0 ? -1 : 0;
         // Levels of the half lie away from the plane: finer voxels have no plane in common with one between voxels.
         const auto refines = [&](const Vector3i& brick) { return brick[axis] == (side > 0 ? 0 : -1); };
@@ -57,8 +57,8 @@ TEST(Mirror, GivesTheWholeFieldOnAllLevels) {
           }
         }
         // The image of a refined brick has no voxels on its first face: they change nothing in the field.
-        const TensorField field(view_of(got), {Interpolation::cubic, Border::extend}),
-            expected(view_of(all), {Interpolation::cubic, Border::extend});
+        const Interpolant extending{Interpolation::cubic, Border::extend};
+        const TensorField field(got, extending), expected(all, extending);
         TensorSampler sampler(field), of_expected(expected);
         std::mt19937 random(1);
         for (int i = 0; i < 1000; ++i) {
@@ -69,8 +69,7 @@ TEST(Mirror, GivesTheWholeFieldOnAllLevels) {
 }
 
 TensorGrid cube_of_identities() {
-  return dense_grid({Vector3i::Zero(), Vector3i::Constant(7)}, Eigen::Affine3d::Identity(),
-                    [](const Vector3i&) { return Matrix3d::Identity(); });
+  return unit_voxels({0, 0, 0}, {7, 7, 7}, [](const Vector3i&) { return Matrix3d::Identity(); });
 }
 
 TEST(Mirror, RefusesPlanesThatVoxelsDoNotFit) {

@@ -1,8 +1,7 @@
-
 #include <array>
 #include <random>
 
-#include "tests/names.h"
+#include "tests/volumes/grid_support.h"
 #include "volumes/sampling/brick_point.h"
 #include "volumes/sampling/tensor_sampler.h"
 
@@ -12,17 +11,9 @@ namespace {
 constexpr Interpolant cubic{Interpolation::cubic, Border::fade};
 
 /// A field of several bricks, without every third block.
-TensorField uneven_field(const Vector3i& first, const Vector3i& last, bool symmetric = false) {
-  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
-  to_world.linear() =
-      Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()).toRotationMatrix() * Vector3d(0.5, 1, 2).asDiagonal();
-  to_world.translation() = Vector3d(10, -20, 30);
-  TensorGrid grid = dense_grid({first, last}, to_world, [&](const Vector3i& at) -> Matrix3d {
-    const Matrix3d T = Matrix3d::NullaryExpr([&](Eigen::Index row, Eigen::Index column) {
-      return std::sin(0.9 * at.x() + 1.7 * static_cast<double>(row)) +
-             std::cos(0.6 * at.y() - 1.1 * at.z() + 2.3 * static_cast<double>(column));
-    });
-    return symmetric ? Matrix3d(T + T.transpose()) : T;
+TensorField uneven_field(const Vector3i& first, const Vector3i& last, bool symmetric) {
+  TensorGrid grid = dense_grid({first, last}, sheared_transform(), [&](const Vector3i& at) {
+    return symmetric ? Matrix3d(waves(at) + waves(at).transpose()) : waves(at);
   });
   for (std::size_t i = 1; i + 1 < grid.blocks.size(); i += 3) grid.blocks[i].active.reset();
   return TensorField(grid, cubic);
@@ -30,16 +21,12 @@ TensorField uneven_field(const Vector3i& first, const Vector3i& last, bool symme
 
 /// Points along random lines, in the extent and up to three voxels outside it: the neighbours are near each other.
 std::vector<Vector3d> index_points(const TensorField& field, std::size_t count) {
-  std::mt19937 engine(1);
-  const auto random = [&] { return std::uniform_real_distribution<double>(0, 1)(engine); };
-  const auto within = [&] {
-    const Vector3d sizes = field.index_bounds().sizes() + Vector3d::Constant(6);
-    return Vector3d(field.index_bounds().min() - Vector3d::Constant(3) +
-                    Vector3d(random(), random(), random()).cwiseProduct(sizes));
-  };
+  std::mt19937 random(1);
+  const AlignedBox3d& extent = field.index_bounds();
+  const AlignedBox3d box(extent.min() - Vector3d::Constant(3), extent.max() + Vector3d::Constant(3));
   std::vector<Vector3d> points;
   while (points.size() < count) {
-    const Vector3d from = within(), to = within();
+    const Vector3d from = random_point(random, box), to = random_point(random, box);
     for (int i = 0; i < 20 && points.size() < count; ++i) points.push_back(from + i / 20.0 * (to - from));
   }
   return points;
