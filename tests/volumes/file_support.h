@@ -79,14 +79,10 @@ typename Grid::Ptr stock_grid_of(const std::filesystem::path& path, const std::s
 }
 
 inline void write_stock(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
-                        std::uint32_t compression) {
+                        std::uint32_t compression = openvdb::io::Archive::DEFAULT_COMPRESSION_FLAGS) {
   openvdb::io::File file(path.string());
   file.setCompression(compression);
   file.write(grids);
-}
-
-inline void write_stock(const std::filesystem::path& path, const openvdb::GridPtrVec& grids) {
-  write_stock(path, grids, openvdb::io::Archive::DEFAULT_COMPRESSION_FLAGS);
 }
 
 /// What is read of a file of grids that OpenVDB itself writes.

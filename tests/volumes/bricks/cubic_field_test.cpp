@@ -31,26 +31,16 @@ Matrix3d polynomial(const Vector3d& index, const Vector3i& degrees, bool symmetr
   return symmetric ? Matrix3d((T + T.transpose()) / 2) : T;
 }
 
-struct ExtentCase {
-  Vector3i first, size;
-  bool symmetric;
-};
-
-void PrintTo(const ExtentCase& c, std::ostream* out) {
-  *out << c.size.transpose() << " voxels from " << c.first.transpose() << (c.symmetric ? ", symmetric" : "");
-}
-
-class Extents : public testing::TestWithParam<ExtentCase> {};
-
 /// Along an axis with n voxels, polynomials of degree up to min(3, n − 1) are exact, and their derivatives, up to the
 /// faces.
-TEST_P(Extents, PolynomialsAreReproduced) {
-  const Vector3i first = GetParam().first, size = GetParam().size, degrees = (size.array() - 1).min(3);
-  const auto at = [&](const Vector3d& index) { return polynomial(index, degrees, GetParam().symmetric); };
+void expect_polynomials(const Vector3i& first, const Vector3i& size, bool symmetric) {
+  SCOPED_TRACE(testing::Message() << size.transpose() << " voxels from " << first.transpose());
+  const Vector3i degrees = (size.array() - 1).min(3);
+  const auto at = [&](const Vector3d& index) { return polynomial(index, degrees, symmetric); };
   const TensorField field(dense_grid(AlignedBox3i(first, first + size - Vector3i::Ones()), sheared_transform(),
                                      [&](const Vector3i& index) { return at((index - first).cast<double>()); }),
                           fading);
-  EXPECT_EQ(field.is_symmetric(), GetParam().symmetric);
+  EXPECT_EQ(field.is_symmetric(), symmetric);
   TensorSampler sampler(field);
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -75,12 +65,16 @@ TEST_P(Extents, PolynomialsAreReproduced) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    CubicField, Extents,
-    testing::Values(ExtentCase{{0, 0, 0}, {16, 16, 16}, false}, ExtentCase{{0, 0, 0}, {17, 17, 17}, true},
-                    ExtentCase{{-3, 5, 7}, {18, 12, 26}, false}, ExtentCase{{7, 7, 15}, {10, 11, 19}, true},
-                    ExtentCase{{2, 0, -9}, {1, 2, 3}, false}, ExtentCase{{6, 6, 6}, {4, 5, 3}, false},
-                    ExtentCase{{7, 15, -1}, {2, 1, 4}, true}, ExtentCase{{0, 0, 0}, {9, 10, 8}, false}));
+TEST(CubicField, ReproducesPolynomials) {
+  expect_polynomials({0, 0, 0}, {16, 16, 16}, false);
+  expect_polynomials({0, 0, 0}, {17, 17, 17}, true);
+  expect_polynomials({-3, 5, 7}, {18, 12, 26}, false);
+  expect_polynomials({7, 7, 15}, {10, 11, 19}, true);
+  expect_polynomials({2, 0, -9}, {1, 2, 3}, false);
+  expect_polynomials({6, 6, 6}, {4, 5, 3}, false);
+  expect_polynomials({7, 15, -1}, {2, 1, 4}, true);
+  expect_polynomials({0, 0, 0}, {9, 10, 8}, false);
+}
 
 /// A grid whose voxels within `box` are active where `is_active`.
 TensorGrid masked_grid(const AlignedBox3i& box, const std::function<bool(const Vector3i&)>& is_active,

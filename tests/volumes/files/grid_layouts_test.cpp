@@ -182,38 +182,34 @@ std::string text(const openvdb::MetaMap& metadata, const std::string& key) {
   return metadata.getMetadata<openvdb::StringMetadata>(key)->value();
 }
 
-TEST(ScalarFiles, HoldTheInvariantAtEachActiveVoxelOfTheField) {
+TEST(ScalarFiles, HoldTheInvariantAtEachActiveVoxelWithItsUnits) {
+  const std::pair<Invariant, const char*> table[] = {{Invariant::norm, "Pa/m"},
+                                                     {Invariant::trace, "Pa/m"},
+                                                     {Invariant::determinant, "(Pa/m)^3"},
+                                                     {Invariant::mode, "1"},
+                                                     {Invariant::fractional_anisotropy, "1"}};
   const TensorGrid field = sparse_grid();
+  std::vector<ScalarGrid> grids;
+  for (const auto& [which, units] : table) grids.push_back(invariant_grid(which, field));
   const Temporary path("a.vdb");
-  write_scalar_vdb(path, {invariant_grid(Invariant::norm, field), invariant_grid(Invariant::mode, field)},
-                   {{"tensorray:source", "a test"}});
-  for (const Invariant which : {Invariant::norm, Invariant::mode}) {
-    const auto grid = stock_grid_of<openvdb::FloatGrid>(path, invariant_names()[static_cast<std::size_t>(which)]);
+  write_scalar_vdb(path, grids, {});
+  for (const auto& [which, units] : table) {
+    const std::string name = invariant_names()[static_cast<std::size_t>(which)];
+    SCOPED_TRACE(name);
+    const auto grid = stock_grid_of<openvdb::FloatGrid>(path, name);
     ASSERT_TRUE(grid);
     EXPECT_EQ(grid->activeVoxelCount(), field.active_voxels());
     EXPECT_EQ(grid->background(), 0);
-    for_each_active(field, [&](const Vector3i& index, const Matrix3f& tensor) {
+    EXPECT_EQ(text(*grid, "tensorray:units"), units);
+    EXPECT_EQ(text(*grid, "tensorray:field"), "stress");
+    const Vector3d world = to_eigen(grid->indexToWorld(openvdb::Vec3d(3, -2, 7)));
+    EXPECT_LE((world - field.to_world * Vector3d(3, -2, 7)).norm(), 1e-12);
+    for_each_active(field, [&, of = which](const Vector3i& index, const Matrix3f& tensor) {
       float value = 0;
       ASSERT_TRUE(grid->tree().probeValue(coord_of(index), value));
-      ASSERT_EQ(value, static_cast<float>(invariant(which, tensor.cast<double>())));
+      ASSERT_EQ(value, static_cast<float>(invariant(of, tensor.cast<double>())));
     });
   }
-}
-
-TEST(ScalarFiles, HaveTheFieldsTransformAndTheInvariantsUnits) {
-  const TensorGrid field = sparse_grid();
-  const Temporary path("a.vdb");
-  write_scalar_vdb(path,
-                   {invariant_grid(Invariant::trace, field), invariant_grid(Invariant::determinant, field),
-                    invariant_grid(Invariant::fractional_anisotropy, field)},
-                   {});
-  const auto grid = stock_grid_of<openvdb::FloatGrid>(path, "trace");
-  const Vector3d world = to_eigen(grid->indexToWorld(openvdb::Vec3d(3, -2, 7)));
-  EXPECT_LE((world - field.to_world * Vector3d(3, -2, 7)).norm(), 1e-12);
-  EXPECT_EQ(text(*grid, "tensorray:units"), "Pa/m");
-  EXPECT_EQ(text(*grid, "tensorray:field"), "stress");
-  EXPECT_EQ(text(*stock_grid_of<openvdb::FloatGrid>(path, "determinant"), "tensorray:units"), "(Pa/m)^3");
-  EXPECT_EQ(text(*stock_grid_of<openvdb::FloatGrid>(path, "fractional_anisotropy"), "tensorray:units"), "1");
 }
 
 TEST(ScalarFiles, FogIsAFogVolumeForOtherPrograms) {

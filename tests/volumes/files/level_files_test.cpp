@@ -23,7 +23,7 @@ TensorGrid three_levels() {
   return grid;
 }
 
-TEST(LevelFiles, AllLevelsComeBack) {
+TEST(LevelFiles, AllLevelsComeBackAndHaveTheirVoxelSizes) {
   const TensorGrid grid = three_levels();
   const Temporary path("a.vdb"), again("b.vdb");
   write_tensor_vdb(path, grid);
@@ -35,6 +35,11 @@ TEST(LevelFiles, AllLevelsComeBack) {
   EXPECT_EQ(bytes_of(path), bytes_of(again));
   EXPECT_EQ(list_vdb(path).size(), 9u);
   EXPECT_THAT(tensor_names(list_vdb(path)), ElementsAre("stress"));
+  const auto at = [&](const char* name, const openvdb::Vec3d& index) {
+    return stock_grid_of<openvdb::Vec3SGrid>(path, name)->indexToWorld(index);
+  };
+  EXPECT_LT((at("stress_row1@2", {4, 8, -12}) - at("stress_row1", {1, 2, -3})).length(), 1e-9);
+  EXPECT_LT((at("stress_row0@1", {4, 8, -12}) - at("stress_row0", {2, 4, -6})).length(), 1e-9);
 }
 
 TEST(LevelFiles, HalfIsOfAllLevels) {
@@ -45,17 +50,6 @@ TEST(LevelFiles, HalfIsOfAllLevels) {
   EXPECT_EQ(read_tensor_vdb(path).finer.size(), 2u);
   grid.finer[1][0].values.fill(Eigen::Matrix3f::Constant(70000));
   EXPECT_THROW(write_tensor_vdb(path, grid, true), std::runtime_error);
-}
-
-/// What OpenVDB itself reads: the voxels of level 2 have a quarter of the size.
-TEST(LevelFiles, LevelsHaveTheirVoxelSize) {
-  const Temporary path("a.vdb");
-  write_tensor_vdb(path, three_levels());
-  const auto at = [&](const char* name, const openvdb::Vec3d& index) {
-    return stock_grid_of<openvdb::Vec3SGrid>(path, name)->indexToWorld(index);
-  };
-  EXPECT_LT((at("stress_row1@2", {4, 8, -12}) - at("stress_row1", {1, 2, -3})).length(), 1e-9);
-  EXPECT_LT((at("stress_row0@1", {4, 8, -12}) - at("stress_row0", {2, 4, -6})).length(), 1e-9);
 }
 
 /// Appends the rows of a level, in which `set` sets voxels.

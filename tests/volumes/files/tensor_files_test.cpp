@@ -22,12 +22,11 @@ TEST(TensorFiles, HalfRoundTripErrsByHalfsPrecisionAndRefusesGreatValues) {
   ASSERT_EQ(read.blocks.size(), grid.blocks.size());
   for (std::size_t i = 0; i < grid.blocks.size(); ++i) {
     EXPECT_EQ(read.blocks[i].active, grid.blocks[i].active);
-    // Half floats have 11 bits, and steps of 2^-24 below 2^-14.
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-      for (int c = 0; c < 9; ++c) {
-        const float value = grid.blocks[i].values[offset](c);
-        ASSERT_NEAR(read.blocks[i].values[offset](c), value, std::max(std::abs(value) / 2048, 3e-8f));
-      }
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      const Matrix3f value = grid.blocks[i].values[offset], error = read.blocks[i].values[offset] - value;
+      // Half floats have 11 bits, and steps of 2^-24 below 2^-14.
+      ASSERT_TRUE((error.array().abs() <= (value.array().abs() / 2048).max(3e-8f)).all()) << value;
+    }
   }
   EXPECT_EQ(list_vdb(path)[0].storage, "half");
   EXPECT_EQ(list_vdb(full)[0].storage, "full");
@@ -185,15 +184,11 @@ TEST(TensorFiles, BlocksAreReadInAnyOrder) {
     EXPECT_EQ(source.metadata.at("tensorray:units"), "Pa/m");
     EXPECT_TRUE(source.to_world.isApprox(grid.to_world, 1e-15));
     ASSERT_EQ(source.shapes.size(), grid.blocks.size());
-    TensorBlock block;
-    for (int turn = 0; turn < 2; ++turn)
-      for (std::size_t i = grid.blocks.size(); i-- > 0;) {
-        read_block(source, i, block);
-        EXPECT_EQ(block.origin, grid.blocks[i].origin);
-        EXPECT_EQ(block.active, grid.blocks[i].active);
-        for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-          ASSERT_LE((block.values[offset] - grid.blocks[i].values[offset]).norm(), half ? 1e-3 : 0);
-      }
+    for (int turn = 0; turn < 2; ++turn) {
+      TensorBlocks blocks = make_blocks(grid.blocks.size());
+      for (std::size_t i = blocks.size(); i-- > 0;) read_block(source, i, blocks[i]);
+      expect_same_blocks(blocks, half ? read_tensor_vdb(path).blocks : grid.blocks);
+    }
   }
 }
 
@@ -268,51 +263,33 @@ TEST(TensorFiles, RefusesDifferentTransformsFrustumsAndUnitsThatAreNoNumbers) {
 
 /// A grid of `value(world)` at the voxels of a ball, so that every kind of edge occurs.
 template <class Grid, class Value>
-typename Grid::Ptr ball(const std::string& name, const openvdb::math::Transform::Ptr& transform, const Value& value) {
+typename Grid::Ptr ball(const std::string& name, const Value& value) {
   const auto grid = stock_grid<Grid>(name);
-  grid->setTransform(transform);
+  // OpenVDB multiplies rows by matrices, whose rows are therefore Eigen's columns.
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(openvdb::Mat4d(sheared_transform().data())));
   for (int x = -9; x <= 9; ++x)
     for (int y = -9; y <= 9; ++y)
       for (int z = -9; z <= 9; ++z)
         if (x * x + y * y + z * z <= 80)
-          grid->tree().setValue({x, y, z}, value(transform->indexToWorld(openvdb::Coord(x, y, z))));
+          grid->tree().setValue({x, y, z}, value(sheared_transform() * Vector3d(x, y, z)));
   return grid;
 }
 
-openvdb::math::Transform::Ptr oblique_transform() {
-  const auto transform = openvdb::math::Transform::createLinearTransform(0.5);
-  transform->preScale(openvdb::Vec3d(1, 0.5, 2));
-  transform->postRotate(0.7, openvdb::math::X_AXIS);
-  transform->postRotate(-0.4, openvdb::math::Z_AXIS);
-  transform->postTranslate(openvdb::Vec3d(3, -1, 2));
-  return transform;
-}
-
-/// A ball of a velocity with this gradient.
-openvdb::Vec3DGrid::Ptr velocity_ball(const Matrix3d& jacobian) {
-  return ball<openvdb::Vec3DGrid>("velocity", oblique_transform(), [&](const openvdb::Vec3d& p) {
-    return openvdb::Vec3d(Vector3d(jacobian * to_eigen(p)).data());
-  });
-}
-
-TEST(TensorFiles, GradientOfALinearFieldIsExactInWorldAxes) {
-  const Matrix3d jacobian = by_rows({1, -2, 0.5, 3, 0.25, -1, 0.125, 4, -0.75});
-  const TensorGrid read = read_stock({velocity_ball(jacobian)}, "", Derive::gradient);
-  EXPECT_EQ(read.name, "velocity");
-  EXPECT_GT(read.active_voxels(), 2000u);
-  for_each_active(read, [&](const Vector3i& index, const Matrix3f& value) {
+TEST(TensorFiles, GradientAndViscousStressOfALinearVelocityAreExactInWorldAxes) {
+  const Matrix3d jacobian = by_rows({1, -2, 0.5, 3, 0.25, -1, 0.125, 4, 1});
+  const Matrix3d stress = by_rows({0.5, 1, 0.625, 1, -1, 3, 0.625, 3, 0.5});  // By hand: the trace is 2.25.
+  const auto velocity = [&](const Vector3d& p) { return openvdb::Vec3d(Vector3d(jacobian * p).data()); };
+  const Temporary of_velocity("v.vdb"), of_gradient("g.vdb");
+  write_stock(of_velocity, {ball<openvdb::Vec3DGrid>("velocity", velocity)});
+  const TensorGrid gradient = read_tensor_vdb(of_velocity, "", Derive::gradient);
+  EXPECT_EQ(gradient.name, "velocity");
+  EXPECT_GT(gradient.active_voxels(), 2000u);
+  for_each_active(gradient, [&](const Vector3i& index, const Matrix3f& value) {
     // The six poles of the ball have no neighbour along two axes, where the field counts as constant.
     if (index.cast<double>().norm() > 8.5) return;
     ASSERT_LE((value.cast<double>() - jacobian).norm(), 1e-5);
   });
-}
-
-TEST(TensorFiles, ViscousStressIsThatOfAVelocityOrOfItsGradient) {
-  const Matrix3d jacobian = by_rows({1, -2, 0.5, 3, 0.25, -1, 0.125, 4, 1});
-  const Matrix3d stress = by_rows({0.5, 1, 0.625, 1, -1, 3, 0.625, 3, 0.5});  // By hand: the trace is 2.25.
-  const Temporary of_velocity("v.vdb"), of_gradient("g.vdb");
-  write_stock(of_velocity, {velocity_ball(jacobian)});
-  write_tensor_vdb(of_gradient, read_tensor_vdb(of_velocity, "", Derive::gradient));
+  write_tensor_vdb(of_gradient, gradient);
   for (const fs::path& path : {of_velocity.path(), of_gradient.path()})
     for (const double sign : {1, -1}) {
       const Derive derive = sign > 0 ? Derive::viscous_stress : Derive::negative_viscous_stress;
@@ -342,11 +319,8 @@ TEST(TensorFiles, DerivativesHaveTheUnitOfTheirGridByLength) {
 
 TEST(TensorFiles, HessianOfAQuadraticIsExactInWorldAxes) {
   const Matrix3d second = by_rows({2, 1, -0.5, 1, -3, 0.25, -0.5, 0.25, 1});
-  const auto potential = [&](const openvdb::Vec3d& p) {
-    return to_eigen(p).dot(0.5 * second * to_eigen(p) + Vector3d(1, 2, 3)) - 5;
-  };
-  const TensorGrid read = read_stock({ball<openvdb::DoubleGrid>("potential", oblique_transform(), potential)},
-                                     "potential", Derive::hessian);
+  const auto potential = [&](const Vector3d& p) { return p.dot(0.5 * second * p + Vector3d(1, 2, 3)) - 5; };
+  const TensorGrid read = read_stock({ball<openvdb::DoubleGrid>("potential", potential)}, "potential", Derive::hessian);
   std::size_t inside = 0;
   for_each_active(read, [&](const Vector3i& index, const Matrix3f& value) {
     ASSERT_EQ(value, Matrix3f(value.transpose()));

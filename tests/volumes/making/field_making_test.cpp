@@ -7,7 +7,7 @@
 
 #include "tests/volumes/grid_support.h"
 #include "tests/volumes/level_support.h"
-#include "volumes/bricks/brick_layout.h"
+#include "volumes/bricks/tensor_field.h"
 #include "volumes/making/noise.h"
 #include "volumes/making/smoothing.h"
 
@@ -32,17 +32,19 @@ Matrix3d damaged(const Vector3i& i) {
   return is_damaged ? Matrix3d(Matrix3d::Constant(NAN)) : symmetric(i);
 }
 
+/// Bit for bit.
 void expect_same_bricks(const TensorField& a, const TensorField& b) {
-  ASSERT_EQ(a.bricks(), b.bricks());
+  ASSERT_EQ(a.levels(), b.levels());
+  for (std::size_t level = 0; level < a.bricks_of_levels().size(); ++level) {
+    EXPECT_EQ(a.bricks_of_levels()[level].places, b.bricks_of_levels()[level].places);
+    EXPECT_EQ(a.bricks_of_levels()[level].strongest, b.bricks_of_levels()[level].strongest);
+  }
   EXPECT_EQ(a.index_bounds().min(), b.index_bounds().min());
   EXPECT_EQ(a.index_bounds().max(), b.index_bounds().max());
   EXPECT_EQ(a.max_norm(), b.max_norm());
-  for (const Vector3i& place : a.bricks()) {
-    const TensorBrick one = a.brick(place), other = b.brick(place);
-    EXPECT_EQ(one.strongest, other.strongest);
-    ASSERT_TRUE(std::equal(one.bending, one.bending + LinearBrick::trailing_offset(one.components), other.bending));
-    ASSERT_TRUE(std::equal(one.trailing, one.trailing + LinearBrick::coefficients, other.trailing));
-  }
+  const BrickMemory &one = a.memory(), &other = b.memory();
+  ASSERT_EQ(one.bytes(), other.bytes());
+  EXPECT_TRUE(std::equal(one.floats.get(), one.floats.get() + one.count * one.stride, other.floats.get()));
 }
 
 void expect_as_from_grid(const std::function<Matrix3d(const Vector3i&)>& value, Eigenvalues mode) {
@@ -84,26 +86,19 @@ TEST(MakeField, LevelsAreEachCleanedAndPreprocessed) {
   for (TensorBlocks* blocks : levels_of(changed))
     for (TensorBlock& block : *blocks) apply_eigenvalues(block, Eigenvalues::absolute);
   const MadeField made = make_field(view_of(grid), Eigenvalues::automatic, {Interpolation::cubic});
-  const TensorField expected(changed, {Interpolation::cubic});
   EXPECT_EQ(made.non_finite, 1u);
   EXPECT_EQ(made.finer_voxels, std::vector<std::size_t>{active_voxels(shapes_of(changed.finer[0]))});
-  const BrickMemory &one = made.field->memory(), &other = expected.memory();
-  ASSERT_EQ(one.bytes(), other.bytes());
-  EXPECT_TRUE(std::equal(one.floats.get(), one.floats.get() + one.count * one.stride, other.floats.get()));
-  EXPECT_EQ(made.field->max_norm(), expected.max_norm());
-}
-
-const AlignedBox3i smoothed_box(Vector3i(-13, -3, 5), Vector3i(25, 14, 30));
-
-TensorGrid grid_of(const AlignedBox3i& voxels, const std::function<Matrix3d(const Vector3i&)>& value) {
-  return dense_grid(voxels, Affine3d(Eigen::Scaling(0.5, 1.0, 3.0)), value);
+  expect_same_bricks(*made.field, TensorField(changed, {Interpolation::cubic}));
 }
 
 /// Holes, from single voxels to whole blocks, so that sums along one axis pass through voxels and blocks without value.
-void make_holes(TensorGrid& grid) {
+TensorGrid grid_with_holes(const std::function<Matrix3d(const Vector3i&)>& value) {
+  const Affine3d to_world(Eigen::Scaling(0.5, 1.0, 3.0));
+  TensorGrid grid = dense_grid({Vector3i(-13, -3, 5), Vector3i(25, 14, 30)}, to_world, value);
   clear_voxels(grid.blocks, [](const Vector3i& i) {
     return (i.x() * 7 + i.y() * 5 + i.z() * 3) % 4 == 0 || (i.x() >= 0 && i.x() < 8 && i.y() >= 0);
   });
+  return grid;
 }
 
 /// The definition, without separating axes.
@@ -121,8 +116,7 @@ Matrix3d mean_about(const TensorGrid& grid, const Vector3i& middle, double devia
 
 TEST(Smoothing, ConstantsStayAtBordersAndBesideHoles) {
   const Matrix3d constant = by_rows({1.1, 0.3, -7, 1e-9, 3e5, 0.7, -0.2, 1.0 / 3, 13});
-  TensorGrid grid = grid_of(smoothed_box, [&](const Vector3i&) { return constant; });
-  make_holes(grid);
+  const TensorGrid grid = grid_with_holes([&](const Vector3i&) { return constant; });
   for (const double deviation : {0.3, 1.0, 2.7}) {
     TensorGrid smoothed = grid;
     smooth(smoothed, deviation);
@@ -131,8 +125,7 @@ TEST(Smoothing, ConstantsStayAtBordersAndBesideHoles) {
 }
 
 TEST(Smoothing, IsTheMeanOfActiveVoxels) {
-  TensorGrid grid = grid_of(smoothed_box, waves);
-  make_holes(grid);
+  const TensorGrid grid = grid_with_holes(waves);
   for (const double deviation : {0.7, 2.5}) {
     TensorGrid smoothed = grid;
     smooth(smoothed, deviation);
@@ -145,7 +138,7 @@ TEST(Smoothing, IsTheMeanOfActiveVoxels) {
 
 TEST(FieldMaking, AndSmoothingDoNotDependOnThreads) {
   const MadeField many = make_field(source_of(waves), Eigenvalues::absolute);
-  TensorGrid smooth_by_many = grid_of(smoothed_box, waves), smooth_by_one = smooth_by_many;
+  TensorGrid smooth_by_many = grid_with_holes(waves), smooth_by_one = smooth_by_many;
   smooth(smooth_by_many, 2);
   const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
   const MadeField one = make_field(source_of(waves), Eigenvalues::absolute);
@@ -173,7 +166,7 @@ TEST(Smoothing, LevelsKeepTheWidthInSpace) {
 }
 
 TEST(Smoothing, RefusesDeviationsOutOfRangeAndNoiseOfLevels) {
-  TensorGrid grid = grid_of(smoothed_box, waves);
+  TensorGrid grid = grid_with_holes(waves);
   for (const double deviation : {-1.0, 20.5, double{NAN}})
     EXPECT_THROW(smooth(grid, deviation), std::invalid_argument) << deviation;
   grid.finer.push_back(grid.blocks);
@@ -203,22 +196,17 @@ TensorGrid noisy_waves(double amplitude, double deviation) {
   return grid;
 }
 
-TEST(Noise, IsKeptAndStructureIsNot) {
+/// Of what is left, neighbours have nothing in common, and the mean is isotropic.
+TEST(Noise, IsKeptWithoutOrderAndStructureIsNot) {
   TensorGrid noise = noisy_waves(0, 0.1), both = noisy_waves(1, 0.1), structure = noisy_waves(1, 0);
   EXPECT_NEAR(variation(noise), 0.3, 0.003);
   for (TensorGrid* grid : {&noise, &both, &structure}) keep_noise(*grid);
   EXPECT_NEAR(variation(noise), 0.3, 0.005);
   EXPECT_NEAR(variation(both), 0.3, 0.03);
   EXPECT_LT(variation(structure), 0.12);  // The ends of the waves, at the grid's faces, and what curves.
-}
-
-/// Neighbours of what is left have nothing in common, and the mean is isotropic.
-TEST(Noise, HasNoOrder) {
-  TensorGrid grid = noisy_waves(1, 0.1);
-  keep_noise(grid);
   double product = 0, square = 0;
   Matrix3d mean = Matrix3d::Zero();
-  for (const TensorBlock& block : grid.blocks)
+  for (const TensorBlock& block : both.blocks)
     for (std::size_t i = 0; i + 1 < TensorBlock::voxels; i += 2) {
       product += double{block.values[i](0, 1)} * block.values[i + 1](0, 1);
       square += double{block.values[i](0, 1)} * block.values[i](0, 1);

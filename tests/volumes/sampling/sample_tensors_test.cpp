@@ -1,4 +1,3 @@
-#include <array>
 #include <random>
 
 #include "tests/volumes/grid_support.h"
@@ -32,20 +31,16 @@ std::vector<Vector3d> index_points(const TensorField& field, std::size_t count) 
   return points;
 }
 
-std::vector<std::array<float, 9>> sampled(const TensorField& field, const std::vector<Vector3d>& points,
-                                          const Vector3i& brick, float factor) {
+std::vector<Matrix3d> sampled(const TensorField& field, const std::vector<Vector3d>& points, const Vector3i& brick,
+                              float factor) {
   const std::size_t room = sampled_room(points.size());
-  std::vector<float> places[3], components(9 * room);
-  for (int axis = 0; axis < 3; ++axis) {
-    places[axis].resize(room);
-    for (std::size_t i = 0; i < points.size(); ++i)
-      places[axis][i] = static_cast<float>(points[i][axis] - 8 * brick[axis]);
-  }
-  const IndexPoints at{brick, {places[0].data(), places[1].data(), places[2].data()}, points.size()};
-  sample_tensors(field, at, factor, components.data(), room);
-  std::vector<std::array<float, 9>> tensors(points.size());
+  Eigen::ArrayXXf places = Eigen::ArrayXXf::Zero(room, 3), components(room, 9);
   for (std::size_t i = 0; i < points.size(); ++i)
-    for (std::size_t c = 0; c < 9; ++c) tensors[i][c] = components[c * room + i];
+    places.row(i) = (points[i] - 8 * brick.cast<double>()).cast<float>().transpose();
+  const IndexPoints at{brick, {&places(0, 0), &places(0, 1), &places(0, 2)}, points.size()};
+  sample_tensors(field, at, factor, components.data(), room);
+  std::vector<Matrix3d> tensors;
+  for (std::size_t i = 0; i < points.size(); ++i) tensors.emplace_back(components.row(i).reshaped(3, 3).cast<double>());
   return tensors;
 }
 
@@ -59,12 +54,11 @@ TEST(SampleTensors, AgreesWithTheSamplerOfOnePoint) {
       TensorSampler sampler(field);
       for (const std::size_t count : {1, 15, 64, 65, 700}) {
         const std::vector<Vector3d> points = index_points(field, count);
-        const auto tensors = sampled(field, points, {-1, 0, 2}, 0.5f);
+        const std::vector<Matrix3d> tensors = sampled(field, points, {-1, 0, 2}, 0.5f);
         for (std::size_t i = 0; i < count; ++i) {
           const Matrix3d expected = 0.5 * sampler.at(field.to_world() * points[i]);
-          const Matrix3d found = Eigen::Map<const Eigen::Matrix3f>(tensors[i].data()).cast<double>();
           // Positions are rounded to 4e-6 of a voxel; neighbouring voxels differ by up to twice the greatest norm.
-          ASSERT_LT((found - expected).norm(), 1e-5 * field.max_norm())
+          ASSERT_LT((tensors[i] - expected).norm(), 1e-5 * field.max_norm())
               << points[i].transpose() << " in " << first.transpose() << " to " << last.transpose();
         }
       }
