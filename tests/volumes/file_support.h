@@ -12,9 +12,7 @@ namespace tensorray {
 
 /// Non-symmetric values, with holes, negative indices, and a sheared transform.
 inline TensorGrid sparse_grid() {
-  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
-  to_world.matrix() << 0.5, 0.1, 0, 3, -0.1, 0.25, 0.05, -7, 0, 0.3, 0.125, 11, 0, 0, 0, 1;
-  TensorGrid grid = dense_grid({Eigen::Vector3i(-11, -3, 5), Eigen::Vector3i(6, 12, 21)}, to_world, waves);
+  TensorGrid grid = dense_grid({Eigen::Vector3i(-11, -3, 5), Eigen::Vector3i(6, 12, 21)}, sheared_transform(), waves);
   clear_voxels(grid.blocks, [](const Eigen::Vector3i& index) {
     const Eigen::Vector3i in_block = index.unaryExpr([](int i) { return i & 7; });
     return TensorBlock::offset(in_block.x(), in_block.y(), in_block.z()) % 5 == 0;

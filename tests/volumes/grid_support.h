@@ -1,6 +1,7 @@
 #pragma once
 /// Grids of tensors, and what is in them.
 
+#include <cstring>
 #include <functional>
 #include <random>
 
@@ -85,12 +86,13 @@ inline Eigen::Vector3d random_point(std::mt19937& random, const Eigen::AlignedBo
   return box.min() + part.cwiseProduct(box.sizes());
 }
 
+/// Values are compared bit for bit: NaN is the same as NaN.
 inline void expect_same_blocks(const TensorBlocks& a, const TensorBlocks& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a[i].origin, b[i].origin);
     EXPECT_EQ(a[i].active, b[i].active);
-    EXPECT_EQ(a[i].values, b[i].values);
+    EXPECT_EQ(std::memcmp(&a[i].values, &b[i].values, sizeof a[i].values), 0) << a[i].origin.transpose();
   }
 }
 

@@ -159,11 +159,8 @@ TensorField general_field(TensorGrid grid) {
 }
 
 /// Whether values are the same, bit for bit; NaN and zeros may have any sign.
-template <class Derived>
-bool same(const Eigen::MatrixBase<Derived>& a, const Eigen::MatrixBase<Derived>& b) {
-  for (Eigen::Index i = 0; i < a.size(); ++i)
-    if (!(a(i) == b(i) || (std::isnan(a(i)) && std::isnan(b(i))))) return false;
-  return true;
+bool same(const Matrix3d& a, const Matrix3d& b) {
+  return (a.array() == b.array() || (a.array().isNaN() && b.array().isNaN())).all();
 }
 
 void expect_same_tensors(const TensorField& a, const TensorField& b) {

@@ -61,13 +61,10 @@ TEST(TensorFiles, FilesOfAnyCompressionHoldTheSame) {
 
 TEST(TensorFiles, KeepsNonFiniteValues) {
   TensorGrid grid = sparse_grid();
-  grid.blocks[0].values[grid.blocks[0].active[1] ? 1 : 2](0, 1) = std::numeric_limits<float>::quiet_NaN();
-  const std::size_t active = grid.active_voxels();
+  grid.blocks[0].values[grid.blocks[0].active._Find_first()](0, 1) = NAN;
   const Temporary path("a.vdb");
   write_tensor_vdb(path, grid);
-  TensorGrid read = read_tensor_vdb(path);
-  EXPECT_EQ(read.active_voxels(), active);
-  EXPECT_EQ(remove_non_finite(read), remove_non_finite(grid));
+  expect_same_blocks(read_tensor_vdb(path), grid);
 }
 
 TEST(TensorFiles, SameGridGivesSameBytes) {

@@ -111,8 +111,7 @@ TEST(Helix, HasItsEigenvaluesOnTheCurve) {
     const double rise = helix.pitch / (2 * pi);
     const Vector3d on(helix.radius * std::cos(angle), helix.radius * std::sin(angle), rise * angle);
     const Matrix3d tensor = sampled(helix, on);
-    const Vector3d tangent =
-        Vector3d(-helix.radius * std::sin(angle), helix.radius * std::cos(angle), rise).normalized();
+    const Vector3d tangent = Vector3d(-on.y(), on.x(), rise).normalized();
     EXPECT_LE((tensor * tangent - helix.along * tangent).norm(), 1e-6);
     EXPECT_NEAR(eigenvalues(tensor)[1].real(), helix.across, 1e-6);
     EXPECT_NEAR(eigenvalues(tensor)[2].real(), helix.across, 1e-6);

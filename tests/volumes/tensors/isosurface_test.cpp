@@ -81,10 +81,7 @@ TEST(IsosurfaceTest, SphereOfSecondOrder) {
 }
 
 TEST(IsosurfaceTest, AnyAffineTransform) {
-  Affine3d to_world = Affine3d::Identity();
-  to_world.translate(Vector3d(0.1, 0, -0.1)).rotate(Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()));
-  to_world.scale(Vector3d(0.05, 0.08, 0.04));
-  to_world.linear() *= by_rows({1, 0.3, 0, 0, 1, 0, 0, 0, 1});
+  const Affine3d to_world(0.09 * sheared_transform().linear());  // Edges of voxels are shorter than 0.08.
   Affine3d mirrored = to_world;
   mirrored.linear().col(1) *= -1;
   for (const Affine3d& transform : {to_world, mirrored}) {
