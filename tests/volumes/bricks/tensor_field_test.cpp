@@ -210,17 +210,6 @@ TEST(SymmetricBricks, BecomeGeneralOnesWithTheFirstTensorThatIsNotSymmetric) {
   expect_same_tensors(TensorField(source_of(std::move(grid))), early);
 }
 
-TEST(TensorGrid, NonFiniteVoxelsAreRemovedAndCounted) {
-  const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
-  TensorGrid grid = unit_voxels({0, 0, 0}, {9, 0, 0}, [&](const Vector3i& i) {
-    return Matrix3d::Constant(i.x() == 3 ? nan : i.x() >= 8 ? infinity : 1).eval();
-  });
-  EXPECT_EQ(remove_non_finite(grid), 3u);
-  EXPECT_EQ(grid.active_voxels(), 7u);
-  EXPECT_EQ(grid.blocks.size(), 1u);  // The second block has no active voxel left.
-  EXPECT_EQ(remove_non_finite(grid), 0u);
-}
-
 /// Expects that each brick has its number and that the places around the bricks have none.
 void expect_finds(const std::vector<Vector3i>& bricks) {
   const BrickIndex index(bricks);
