@@ -1,17 +1,18 @@
 #pragma once
 /// Temporary files, a tensor grid with everything that files must keep, and grids that OpenVDB itself writes.
 
+#include <tuple>
+
 #include "tests/files.h"
 #include "tests/volumes/grid_support.h"
+#include "volumes/files/tensor_files.h"
 #include "volumes/vdb/vdb_archive.h"
 
 namespace tensorray {
 
 /// Non-symmetric values, with holes, negative indices, and a sheared transform.
 inline TensorGrid sparse_grid() {
-  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
-  to_world.matrix() << 0.5, 0.1, 0, 3, -0.1, 0.25, 0.05, -7, 0, 0.3, 0.125, 11, 0, 0, 0, 1;
-  TensorGrid grid = dense_grid({Eigen::Vector3i(-11, -3, 5), Eigen::Vector3i(6, 12, 21)}, to_world, waves);
+  TensorGrid grid = dense_grid({Eigen::Vector3i(-11, -3, 5), Eigen::Vector3i(6, 12, 21)}, sheared_transform(), waves);
   clear_voxels(grid.blocks, [](const Eigen::Vector3i& index) {
     const Eigen::Vector3i in_block = index.unaryExpr([](int i) { return i & 7; });
     return TensorBlock::offset(in_block.x(), in_block.y(), in_block.z()) % 5 == 0;
@@ -28,6 +29,13 @@ typename Grid::Ptr stock_grid(const std::string& name) {
   return grid;
 }
 
+template <class T>
+Eigen::Matrix<T, 3, 1> to_eigen(const openvdb::math::Vec3<T>& v) {
+  return {v[0], v[1], v[2]};
+}
+
+inline openvdb::Coord coord_of(const Eigen::Vector3i& index) { return openvdb::Coord(index.data()); }
+
 /// An empty grid of a type that OpenVDB makes by its name, so that it is not compiled here.
 inline openvdb::GridBase::Ptr stock_grid_of_type(const std::string& type, const std::string& name) {
   openvdb::initialize();
@@ -37,11 +45,11 @@ inline openvdb::GridBase::Ptr stock_grid_of_type(const std::string& type, const 
 }
 
 /// The rows of a tensor: `set(grid, row)` sets their voxels.
-template <class Set>
+template <class Grid = openvdb::Vec3SGrid, class Set>
 openvdb::GridPtrVec stock_rows(const std::string& name, const Set& set) {
   openvdb::GridPtrVec rows;
   for (int row = 0; row < 3; ++row) {
-    const auto grid = stock_grid<openvdb::Vec3SGrid>(name + "_row" + std::to_string(row));
+    const auto grid = stock_grid<Grid>(name + "_row" + std::to_string(row));
     set(*grid, row);
     rows.push_back(grid);
   }
@@ -69,14 +77,40 @@ typename Grid::Ptr stock_grid_of(const std::filesystem::path& path, const std::s
 }
 
 inline void write_stock(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
-                        std::uint32_t compression) {
+                        std::uint32_t compression = openvdb::io::Archive::DEFAULT_COMPRESSION_FLAGS) {
   openvdb::io::File file(path.string());
   file.setCompression(compression);
   file.write(grids);
 }
 
-inline void write_stock(const std::filesystem::path& path, const openvdb::GridPtrVec& grids) {
-  write_stock(path, grids, openvdb::io::Archive::DEFAULT_COMPRESSION_FLAGS);
+/// What is read of a file of grids that OpenVDB itself writes.
+inline TensorGrid read_stock(const openvdb::GridPtrVec& grids, const std::string& name = "",
+                             Derive derive = Derive::none) {
+  const Temporary path("stock.vdb");
+  write_stock(path, grids);
+  return read_tensor_vdb(path, name, derive);
+}
+
+/// What a TensorGrid promises (tensor_grid.h), whatever the file says.
+inline void expect_sound(const TensorGrid& grid) {
+  const Eigen::Vector3i* before = nullptr;
+  for (const TensorBlock& block : grid.blocks) {
+    EXPECT_TRUE(block.active.any());
+    EXPECT_TRUE(block.origin.unaryExpr([](int i) { return i & (TensorBlock::size - 1); }).isZero());
+    const auto key = [](const Eigen::Vector3i& at) { return std::make_tuple(at.x(), at.y(), at.z()); };
+    EXPECT_TRUE(!before || key(*before) < key(block.origin));
+    before = &block.origin;
+    bool is_zero_elsewhere = true;
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      is_zero_elsewhere = is_zero_elsewhere && (block.active[offset] || block.values[offset].isZero(0));
+    EXPECT_TRUE(is_zero_elsewhere) << block.origin.transpose();
+  }
+}
+
+/// Matches what throws a std::runtime_error of one line that has all of these words.
+template <class... Words>
+auto fails_with(const Words&... words) {
+  return ThrowsMessage<std::runtime_error>(AllOf(Not(HasSubstr("\n")), HasSubstr(words)...));
 }
 
 }  // namespace tensorray

@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <fstream>
+#include <set>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -23,10 +24,9 @@ namespace fs = std::filesystem;
 
 class OutputFileTest : public ::testing::Test {
  protected:
-  std::vector<std::string> names() const {
-    std::vector<std::string> all;
-    for (const auto& entry : fs::directory_iterator(folder_)) all.push_back(entry.path().filename().string());
-    std::sort(all.begin(), all.end());
+  std::set<std::string> names() const {
+    std::set<std::string> all;
+    for (const auto& entry : fs::directory_iterator(folder_)) all.insert(entry.path().filename().string());
     return all;
   }
 
@@ -35,6 +35,12 @@ class OutputFileTest : public ::testing::Test {
     for (const fs::path& target : targets) files.emplace_back(folder_ / target);
     for (const OutputFile& file : files) write_bytes(file.path(), "new");
     return files;
+  }
+
+  static void replace(const fs::path& target, const std::string& bytes) {
+    OutputFile file(target);
+    write_bytes(file.path(), bytes);
+    file.commit();
   }
 
   const TemporaryFolder temporary_;
@@ -67,14 +73,9 @@ TEST_F(OutputFileTest, AppendsToWhatTheProcessHasOpen) {
   const Descriptor log = open_file(folder_ / "log", O_WRONLY | O_CREAT);
   ASSERT_TRUE(write_whole(log.get(), "before, "));
   const std::string number = std::to_string(log.get());
-  const std::vector<std::string> folders{"/proc/self/fd/", "/dev/fd/", "/dev/./fd/"};
-  for (const std::string& folder : folders) {
+  for (const std::string folder : {"/proc/self/fd/", "/dev/fd/", "/dev/./fd/"}) {
     fs::create_symlink(folder + number, folder_ / "link");
-    for (const fs::path& target : {fs::path(folder + number), folder_ / "link"}) {
-      OutputFile file(target);
-      write_bytes(file.path(), "more, ");
-      file.commit();
-    }
+    for (const fs::path& target : {fs::path(folder + number), folder_ / "link"}) replace(target, "more, ");
     fs::remove(folder_ / "link");
   }
   EXPECT_EQ(bytes_of(folder_ / "log"), "before, more, more, more, more, more, more, ");
@@ -87,7 +88,7 @@ TEST_F(OutputFileTest, Moves) {
   files.erase(files.begin());
   ASSERT_EQ(names().size(), 1u) << "the temporary of a.png is gone, that of b.png is not";
   commit_all(files);
-  EXPECT_EQ(names(), std::vector<std::string>{"b.png"});
+  EXPECT_THAT(names(), ElementsAre("b.png"));
   EXPECT_THROW(files[0].commit(), std::logic_error);
 }
 
@@ -100,14 +101,11 @@ TEST_F(OutputFileTest, NewFilesHaveThePermissionsOfTheMask) {
 }
 
 TEST_F(OutputFileTest, FollowsLinks) {
-  fs::create_directories(folder_ / "elsewhere");
   write_bytes(folder_ / "elsewhere" / "real.png", "old");
   fs::create_symlink("elsewhere/real.png", folder_ / "link.png");
   fs::create_symlink("elsewhere/none.png", folder_ / "dangling.png");
   for (const char* name : {"link.png", "dangling.png"}) {
-    OutputFile file(folder_ / name);
-    write_bytes(file.path(), "new");
-    file.commit();
+    replace(folder_ / name, "new");
     EXPECT_TRUE(fs::is_symlink(folder_ / name));
   }
   EXPECT_EQ(bytes_of(folder_ / "elsewhere" / "real.png"), "new");
@@ -163,7 +161,7 @@ TEST_F(OutputFileTest, AllFilesChangeOrNone) {
   files.clear();
   EXPECT_EQ(bytes_of(folder_ / "a"), "old a");
   EXPECT_EQ(bytes_of(folder_ / "c"), "old c");
-  EXPECT_THAT(names(), ::testing::ElementsAre("a", "c", "other"));
+  EXPECT_THAT(names(), ElementsAre("a", "c", "other"));
   EXPECT_TRUE(fs::is_empty(folder_ / "other"));
 }
 
@@ -175,7 +173,7 @@ TEST_F(OutputFileTest, CommittingSeveralFilesLeavesNothingElse) {
   EXPECT_EQ(bytes_of(folder_ / "a"), "new");
   EXPECT_EQ(bytes_of(folder_ / "b"), "new");
   EXPECT_EQ(fs::status(folder_ / "a").permissions(), fs::perms::owner_read | fs::perms::owner_write);
-  EXPECT_THAT(names(), ::testing::ElementsAre("a", "b"));
+  EXPECT_THAT(names(), ElementsAre("a", "b"));
 }
 
 TEST_F(OutputFileTest, TargetsThatCannotBe) {
@@ -201,24 +199,23 @@ TEST_F(OutputFileTest, WriteProtection) {
 
 TEST(ReplaceFileTest, WritesAllOrNothing) {
   const TemporaryFolder folder;
-  const std::filesystem::path file = folder / "a";
+  const fs::path file = folder / "a";
   replace_file(file, {"one ", "two"});
   EXPECT_EQ(bytes_of(file), "one two");
   std::ofstream(folder / "a.new") << "somebody's";
-  const std::filesystem::path beside =
-      folder / fmt::format(".tensorray-{:016x}.new", content_hash(file.filename().string()));
+  const fs::path beside = folder / fmt::format(".tensorray-{:016x}.new", content_hash(file.filename().string()));
   std::ofstream(beside) << "what a killed process left, which is longer than the next";
   replace_file(file, {"three"});
   EXPECT_EQ(bytes_of(file), "three");
   EXPECT_EQ(bytes_of(folder / "a.new"), "somebody's");
-  EXPECT_FALSE(std::filesystem::exists(beside));
-  std::filesystem::create_symlink("a.new", beside);
+  EXPECT_FALSE(fs::exists(beside));
+  fs::create_symlink("a.new", beside);
   EXPECT_THROW(replace_file(file, {"four"}), std::runtime_error);
   EXPECT_EQ(bytes_of(folder / "a.new"), "somebody's");
   EXPECT_THROW(replace_file(folder / "none" / "a", {"x"}), std::runtime_error);
   const FileSizeLimit full(0);
   EXPECT_THROW(replace_file(folder / "full", {"x"}), std::runtime_error);
-  EXPECT_FALSE(std::filesystem::exists(folder / "full"));
+  EXPECT_FALSE(fs::exists(folder / "full"));
 }
 
 bool is_open(int descriptor) { return fcntl(descriptor, F_GETFD) >= 0; }
@@ -267,13 +264,12 @@ TEST(DescriptorTest, UnnamedFilesHaveNoName) {
   const TemporaryFolder folder;
   const Descriptor file = open_unnamed(folder / "");
   ASSERT_TRUE(file.is_open());
-  EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
+  EXPECT_TRUE(fs::is_empty(folder / ""));
   EXPECT_TRUE(write_whole(file.get(), "text"));
   EXPECT_FALSE(open_unnamed(folder / "none").is_open());
   const UnnamedFile shared;
-  std::ofstream(shared.path()) << "shared";
-  std::ifstream again(shared.path());
-  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(again), {}), "shared");
+  write_bytes(shared.path(), "shared");
+  EXPECT_EQ(bytes_of(shared.path()), "shared");
 }
 
 }  // namespace

@@ -88,11 +88,6 @@ TEST_F(SharedFiles, AreWaitedFor) {
   EXPECT_TRUE(ended_well(second));
 }
 
-TEST_F(SharedFiles, WaitingEndsWhereItsCallerWants) {
-  SharedFile first("key", nothing_);
-  EXPECT_THROW(SharedFile("key", [] { throw std::runtime_error("enough"); }), std::runtime_error);
-}
-
 /// Who has found a file keeps it. Others then make their own.
 TEST_F(SharedFiles, EndWithTheProcessThatMadeThem) {
   auto first = std::make_unique<SharedFile>("key", nothing_);
@@ -124,10 +119,10 @@ TEST_F(SharedFiles, AreMadeAgainIfTheirProcessIsKilled) {
   EXPECT_TRUE(is_empty());
 }
 
-/// Others then do not wait for it.
-TEST_F(SharedFiles, WhatCannotBeOfferedIsNotWaitedFor) {
+TEST_F(SharedFiles, WaitingEndsWhereItsCallerWantsAndWhereNothingCanBeOffered) {
   const auto enough = [] { throw std::runtime_error("waits"); };
   SharedFile first("key", nothing_);
+  EXPECT_THROW(SharedFile("key", enough), std::runtime_error);
   first.offer(Descriptor());
   EXPECT_FALSE(SharedFile("key", enough).file().is_open());
 }

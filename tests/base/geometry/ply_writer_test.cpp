@@ -12,26 +12,16 @@ TEST(PlyWriter, KeepsDoublePrecisionAndIsLittleEndian) {
   mesh.triangles = {{0, 1, 2}, {2, 1, 0}};
   const Temporary path("a.ply");
   write_ply(path, mesh, PlyPositions::double_precision);
-  const std::string bytes = bytes_of(path);
-
-  const std::string header =
+  std::string expected =
       "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
       "property double z\nelement face 2\nproperty list uchar uint vertex_indices\nend_header\n";
-  ASSERT_EQ(bytes.substr(0, header.size()), header);
-  ASSERT_EQ(bytes.size(), header.size() + 3 * 24 + 2 * 13);
-  const char* next = bytes.data() + header.size();
-  for (const Eigen::Vector3d& vertex : mesh.vertices)
-    for (const double x : vertex) {
-      EXPECT_EQ(read_number<double>(next, ByteOrder::little), x);
-      next += sizeof(double);
-    }
+  for (const Vector3d& vertex : mesh.vertices)
+    for (const double x : vertex) append_number(x, ByteOrder::little, expected);
   for (const auto& triangle : mesh.triangles) {
-    EXPECT_EQ(*next++, 3);
-    for (const std::uint32_t corner : triangle) {
-      EXPECT_EQ(read_number<std::uint32_t>(next, ByteOrder::little), corner);
-      next += sizeof(std::uint32_t);
-    }
+    expected += '\3';
+    for (const std::uint32_t corner : triangle) append_number(corner, ByteOrder::little, expected);
   }
+  EXPECT_EQ(bytes_of(path), expected);
 }
 
 TEST(PlyWriter, NamesAFileThatCannotBeWritten) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -17,36 +18,27 @@ namespace {
 using namespace test;
 
 TEST(ArchiveTest, GivesBackWhatItWasGiven) {
-  std::vector<int> numbers{1, 2, 3}, none, copies{7};
-  std::string text = "text", copy;
-  double value = 0.1, again = 0;
+  using Values = std::tuple<std::vector<int>, double, std::string, std::vector<int>>;
+  const auto copy = [](Archive& archive, Values& values) {
+    auto& [numbers, number, text, none] = values;
+    archive.copy_list(numbers);
+    archive.copy(number);
+    archive.copy_list(text);
+    archive.copy_list(none);
+  };
+  Values given{{1, 2, 3}, 0.1, "text", {}}, found{{}, 0, "", {7}};
   Archive to;
-  to.copy_list(numbers);
-  to.copy(value);
-  to.copy_list(text);
-  to.copy_list(none);
+  copy(to, given);
   const std::string bytes = to.take();
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     Archive cut(std::string_view(bytes).substr(0, size));
-    EXPECT_THROW(
-        {
-          cut.copy_list(copies);
-          cut.copy(again);
-          cut.copy_list(copy);
-          cut.copy_list(copies);
-        },
-        DamagedArchive)
-        << size;
+    EXPECT_THROW(copy(cut, found), DamagedArchive) << size;
   }
   Archive from(bytes);
-  from.copy_list(copies);
-  EXPECT_EQ(copies, numbers);
   EXPECT_THROW(from.finish(), DamagedArchive);
-  from.copy(again);
-  from.copy_list(copy);
-  from.copy_list(copies);
+  copy(from, found);
   from.finish();
-  EXPECT_TRUE(again == value && copy == text && copies.empty());
+  EXPECT_EQ(found, given);
 }
 
 /// A count that no bytes follow asks for no memory.

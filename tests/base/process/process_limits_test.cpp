@@ -26,10 +26,7 @@ using Files = std::map<std::string, std::string>;
 class System {
  public:
   explicit System(const Files& files) {
-    for (const auto& [name, text] : files) {
-      std::filesystem::create_directories((root() / name).parent_path());
-      std::ofstream(root() / name) << text;
-    }
+    for (const auto& [name, text] : files) write_bytes(root() / name, text);
   }
   std::filesystem::path root() const { return folder_ / "root"; }
 
@@ -37,7 +34,9 @@ class System {
   TemporaryFolder folder_;
 };
 
-const std::string memory_of_1000_kib = "MemTotal:        800 kB\nMemFree: 9 kB\nSwapTotal:   200 kB\n";
+const Files::value_type memory_of_1000_kib{"proc/meminfo",
+                                           "MemTotal:        800 kB\nMemFree: 9 kB\nSwapTotal:   200 kB\n"};
+const Files::value_type in_container{"proc/self/cgroup", "0::/\n"};
 
 TEST(ProcessLimitsTest, QuotasAreFoundWhereSystemsHaveThem) {
   const double all = std::thread::hardware_concurrency();
@@ -49,10 +48,10 @@ TEST(ProcessLimitsTest, QuotasAreFoundWhereSystemsHaveThem) {
   const double none = INFINITY;
   const std::vector<Case> cases{
       {"nothing is known", {}, none},
-      {"a container", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "100000 100000\n"}}, 1},
-      {"no quota", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "max 100000\n"}}, none},
-      {"a part", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "50000 100000\n"}}, 1},
-      {"more than one", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "150000 100000\n"}}, 2},
+      {"a container", {in_container, {"sys/fs/cgroup/cpu.max", "100000 100000\n"}}, 1},
+      {"no quota", {in_container, {"sys/fs/cgroup/cpu.max", "max 100000\n"}}, none},
+      {"a part", {in_container, {"sys/fs/cgroup/cpu.max", "50000 100000\n"}}, 1},
+      {"more than one", {in_container, {"sys/fs/cgroup/cpu.max", "150000 100000\n"}}, 2},
       {"of an outer group",
        {{"proc/self/cgroup", "0::/jobs/17/step\n"},
         {"sys/fs/cgroup/jobs/17/step/cpu.max", "max 100000\n"},
@@ -72,7 +71,7 @@ TEST(ProcessLimitsTest, QuotasAreFoundWhereSystemsHaveThem) {
         {"sys/fs/cgroup/cpu/a/cpu.cfs_quota_us", "-1\n"},
         {"sys/fs/cgroup/cpu/a/cpu.cfs_period_us", "100000\n"}},
        none},
-      {"not a number", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "much of it\n"}}, none},
+      {"not a number", {in_container, {"sys/fs/cgroup/cpu.max", "much of it\n"}}, none},
       {"nonsense", {{"proc/self/cgroup", "\n:\n::\n0\n"}, {"sys/fs/cgroup/cpu.max", "0 0\n"}}, none}};
   for (const Case& each : cases)
     EXPECT_EQ(usable_processors(System(each.files).root()), std::min(all, each.processors)) << each.what;
@@ -85,23 +84,18 @@ TEST(ProcessLimitsTest, TheLeastMemoryCounts) {
     double bytes;
     const char* cause;
   };
+  const char *machine = "this machine's memory", *container = "the container's limit";
   const std::vector<Case> cases{
-      {"a machine", {{"proc/meminfo", memory_of_1000_kib}}, 1024000, "this machine's memory"},
-      {"a container",
-       {{"proc/meminfo", memory_of_1000_kib}, {"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/memory.max", "5000\n"}},
-       5000,
-       "the container's limit"},
-      {"without a limit",
-       {{"proc/meminfo", memory_of_1000_kib}, {"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/memory.max", "max\n"}},
-       1024000,
-       "this machine's memory"},
+      {"a machine", {memory_of_1000_kib}, 1024000, machine},
+      {"a container", {memory_of_1000_kib, in_container, {"sys/fs/cgroup/memory.max", "5000\n"}}, 5000, container},
+      {"without a limit", {memory_of_1000_kib, in_container, {"sys/fs/cgroup/memory.max", "max\n"}}, 1024000, machine},
       {"the first version",
-       {{"proc/meminfo", memory_of_1000_kib},
+       {memory_of_1000_kib,
         {"proc/self/cgroup", "5:memory:/a\n"},
         {"sys/fs/cgroup/memory/a/memory.limit_in_bytes", "7000\n"},
         {"sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712\n"}},
        7000,
-       "the container's limit"}};
+       container}};
   for (const Case& each : cases) {
     const MemoryLimit limit = memory_limit(System(each.files).root());
     EXPECT_EQ(limit.bytes, each.bytes) << each.what;
@@ -142,11 +136,10 @@ ProgramEnd run_shell(const std::string& command, const UnnamedFile& shared = {})
 }
 
 TEST(ChildProgram, SaysHowItEnded) {
-  const ProgramEnd good = run_shell("exit 0");
+  const ProgramEnd good = run_shell("exit 0"), bad = run_shell("echo 'what went wrong' >&2; exit 3");
   EXPECT_EQ(good.status, 0);
   EXPECT_EQ(good.signal, 0);
   EXPECT_EQ(good.error, "");
-  const ProgramEnd bad = run_shell("echo 'what went wrong' >&2; exit 3");
   EXPECT_EQ(bad.status, 3);
   EXPECT_EQ(bad.error, "what went wrong\n");
   EXPECT_EQ(run_shell("kill -SEGV $$").signal, SIGSEGV);
@@ -159,10 +152,8 @@ TEST(ChildProgram, ThatIsInterruptedCancels) {
 }
 
 TEST(ChildProgram, ThatIsMissingIsNamed) {
-  EXPECT_NE(message([] {
-              run_program("/no/such/program", {}, UnnamedFile());
-            }).find("/no/such/program cannot be started: No such file"),
-            std::string::npos);
+  const std::string error = message([] { run_program("/no/such/program", {}, UnnamedFile()); });
+  EXPECT_THAT(error, HasSubstr("/no/such/program cannot be started: No such file"));
 }
 
 TEST(ChildProgram, SharesAFile) {

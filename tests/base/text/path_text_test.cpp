@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <random>
+#include <regex>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -15,26 +16,11 @@ namespace {
 
 /// Whether a text is UTF-8, by the table of the Unicode standard (table 3-7), which lists ranges of bytes.
 bool is_utf8(const std::string& text) {
-  struct Row {
-    unsigned first[2], second[2];
-    int size;
-  };
-  const std::vector<Row> rows{
-      {{0x00, 0x7f}, {0, 0}, 1},       {{0xc2, 0xdf}, {0x80, 0xbf}, 2}, {{0xe0, 0xe0}, {0xa0, 0xbf}, 3},
-      {{0xe1, 0xec}, {0x80, 0xbf}, 3}, {{0xed, 0xed}, {0x80, 0x9f}, 3}, {{0xee, 0xef}, {0x80, 0xbf}, 3},
-      {{0xf0, 0xf0}, {0x90, 0xbf}, 4}, {{0xf1, 0xf3}, {0x80, 0xbf}, 4}, {{0xf4, 0xf4}, {0x80, 0x8f}, 4}};
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
-  const auto is_in = [](unsigned value, const unsigned(&range)[2]) { return value >= range[0] && value <= range[1]; };
-  for (std::size_t at = 0; at < text.size();) {
-    const Row* found = nullptr;
-    for (const Row& row : rows)
-      if (is_in(byte(at), row.first) && (row.size == 1 || is_in(byte(at + 1), row.second))) found = &row;
-    if (!found) return false;
-    for (int i = 2; i < found->size; ++i)
-      if ((byte(at + static_cast<std::size_t>(i)) & 0xc0u) != 0x80u) return false;
-    at += static_cast<std::size_t>(found->size);
-  }
-  return true;
+  static const std::regex table(
+      "([\x01-\x7f]|[\xc2-\xdf][\x80-\xbf]|\xe0[\xa0-\xbf][\x80-\xbf]|[\xe1-\xec][\x80-\xbf]{2}|"
+      "\xed[\x80-\x9f][\x80-\xbf]|[\xee-\xef][\x80-\xbf]{2}|\xf0[\x90-\xbf][\x80-\xbf]{2}|"
+      "[\xf1-\xf3][\x80-\xbf]{3}|\xf4[\x80-\x8f][\x80-\xbf]{2})*");
+  return std::regex_match(text, table);
 }
 
 TEST(PathTextTest, EachPathComesBack) {

@@ -1,11 +1,12 @@
-// A cubic field: what it reproduces, what it does at borders, and that all readers see the same.
+// A cubic field: what it reproduces, what it does at borders, and that slabs of any size give the same.
 
 #include <functional>
 #include <random>
 
 #include "tests/volumes/grid_support.h"
+#include "volumes/bricks/coefficients.h"
 #include "volumes/bricks/tensor_field.h"
-#include "volumes/grids/tensor_grid.h"
+#include "volumes/grids/block_source.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
@@ -13,13 +14,6 @@ namespace {
 
 constexpr Interpolant fading{Interpolation::cubic, Border::fade}, extending{Interpolation::cubic, Border::extend};
 constexpr double rounding = 4e-6;  // Of single precision, for values of 1: a coefficient is a sum of some 10 of them.
-
-Eigen::Affine3d sheared() {
-  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
-  to_world.linear() << 0.5, 0.1, 0, -0.2, 0.3, 0.05, 0, 0.1, 0.8;
-  to_world.translation() = Vector3d(1, -2, 0.5);
-  return to_world;
-}
 
 /// A polynomial of degree `degrees` along each axis of index space, of values up to about 1 in a box of the size `box`.
 Matrix3d polynomial(const Vector3d& index, const Vector3i& degrees, bool symmetric) {
@@ -37,33 +31,19 @@ Matrix3d polynomial(const Vector3d& index, const Vector3i& degrees, bool symmetr
   return symmetric ? Matrix3d((T + T.transpose()) / 2) : T;
 }
 
-struct ExtentCase {
-  Vector3i first, size;
-  bool symmetric;
-};
-
-void PrintTo(const ExtentCase& c, std::ostream* out) {
-  *out << c.size.transpose() << " voxels from " << c.first.transpose() << (c.symmetric ? ", symmetric" : "");
-}
-
-class Extents : public testing::TestWithParam<ExtentCase> {};
-
 /// Along an axis with n voxels, polynomials of degree up to min(3, n − 1) are exact, and their derivatives, up to the
 /// faces.
-TEST_P(Extents, PolynomialsAreReproduced) {
-  const auto [first, size, symmetric] = GetParam();
+void expect_polynomials(const Vector3i& first, const Vector3i& size, bool symmetric) {
+  SCOPED_TRACE(testing::Message() << size.transpose() << " voxels from " << first.transpose());
   const Vector3i degrees = (size.array() - 1).min(3);
-  const bool sym = symmetric;
-  const TensorField field(dense_grid(AlignedBox3i(first, first + size - Vector3i::Ones()), sheared(),
-                                     [&, from = first](const Vector3i& index) {
-                                       return polynomial((index - from).cast<double>(), degrees, sym);
-                                     }),
+  const auto at = [&](const Vector3d& index) { return polynomial(index, degrees, symmetric); };
+  const TensorField field(dense_grid(AlignedBox3i(first, first + size - Vector3i::Ones()), sheared_transform(),
+                                     [&](const Vector3i& index) { return at((index - first).cast<double>()); }),
                           fading);
   EXPECT_EQ(field.is_symmetric(), symmetric);
   TensorSampler sampler(field);
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform(0, 1);
-  const auto at = [&](const Vector3d& index) { return polynomial(index, degrees, sym); };
   for (int n = 0; n < 400; ++n) {
     Vector3d index;
     for (int axis = 0; axis < 3; ++axis) {
@@ -85,24 +65,21 @@ TEST_P(Extents, PolynomialsAreReproduced) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    CubicField, Extents,
-    testing::Values(ExtentCase{{0, 0, 0}, {16, 16, 16}, false}, ExtentCase{{0, 0, 0}, {17, 17, 17}, true},
-                    ExtentCase{{-3, 5, 7}, {18, 12, 26}, false}, ExtentCase{{7, 7, 15}, {10, 11, 19}, true},
-                    ExtentCase{{2, 0, -9}, {1, 2, 3}, false}, ExtentCase{{6, 6, 6}, {4, 5, 3}, false},
-                    ExtentCase{{7, 15, -1}, {2, 1, 4}, true}, ExtentCase{{0, 0, 0}, {9, 10, 8}, false}));
-
-Matrix3d noise(std::mt19937& random) {
-  std::normal_distribution<double> normal;
-  Matrix3d T;
-  for (double& value : T.reshaped()) value = normal(random);
-  return T;
+TEST(CubicField, ReproducesPolynomials) {
+  expect_polynomials({0, 0, 0}, {16, 16, 16}, false);
+  expect_polynomials({0, 0, 0}, {17, 17, 17}, true);
+  expect_polynomials({-3, 5, 7}, {18, 12, 26}, false);
+  expect_polynomials({7, 7, 15}, {10, 11, 19}, true);
+  expect_polynomials({2, 0, -9}, {1, 2, 3}, false);
+  expect_polynomials({6, 6, 6}, {4, 5, 3}, false);
+  expect_polynomials({7, 15, -1}, {2, 1, 4}, true);
+  expect_polynomials({0, 0, 0}, {9, 10, 8}, false);
 }
 
 /// A grid whose voxels within `box` are active where `is_active`.
 TensorGrid masked_grid(const AlignedBox3i& box, const std::function<bool(const Vector3i&)>& is_active,
                        const std::function<Matrix3d(const Vector3i&)>& value) {
-  TensorGrid grid = dense_grid(box, Eigen::Affine3d::Identity(), value);
+  TensorGrid grid = unit_voxels(box.min(), box.max(), value);
   clear_voxels(grid.blocks, [&](const Vector3i& index) { return !is_active(index); });
   return grid;
 }
@@ -124,11 +101,10 @@ void visit_halves(const Visit& visit) {
 
 /// A dense field of any values has them at its voxels.
 TEST(CubicField, InterpolatesItsVoxels) {
-  const TensorGrid grid =
-      dense_grid(AlignedBox3i(Vector3i(-5, 1, 6), Vector3i(12, 20, 22)), sheared(), [](auto& index) {
-        std::mt19937 own(static_cast<unsigned>(index.dot(Vector3i(1, 100, 10000)) + 1000000));
-        return noise(own);
-      });
+  TensorGrid grid = dense_grid({Vector3i(-5, 1, 6), Vector3i(12, 20, 22)}, sheared_transform(), ones);
+  std::mt19937 random(1);
+  std::normal_distribution<float> normal;
+  for_each_value(grid, [&](Matrix3f& value) { value = Matrix3f::NullaryExpr([&] { return normal(random); }); });
   const TensorField field(grid, fading);
   TensorSampler sampler(field);
   for_each_active(grid, [&](const Vector3i& index, const Matrix3f& value) {
@@ -196,14 +172,74 @@ TEST(CubicField, ThinLayersAtFacesKeepTheirValues) {
 /// Values beside each other whose squares are far apart, some beyond single precision.
 TEST(CubicField, TheBoundHoldsForValuesOfAnySize) {
   for (const double large : {1e10, 1e20, 1e35}) {
-    const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(7, 7, 7)), sheared(),
-                                       [&](const Vector3i& v) {
-                                         Matrix3d T = Matrix3d(Vector3d(1, -2, 0.5).asDiagonal());
-                                         return v == Vector3i(3, 3, 3) ? Matrix3d(large * T) : T;
-                                       }),
-                            fading);
-    EXPECT_GT(field.brick({0, 0, 0}).strongest, large);
+    const TensorGrid grid = unit_voxels({0, 0, 0}, {7, 7, 7}, [&](const Vector3i& v) {
+      return Matrix3d((v == Vector3i(3, 3, 3) ? large : 1) * Vector3d(1, -2, 0.5).asDiagonal());
+    });
+    EXPECT_GT(TensorField(grid, fading).brick({0, 0, 0}).strongest, large);
   }
+}
+
+/// Blocks with gaps along all axes, and voxels that are missing; the last plane along x has no cell of its own.
+std::vector<BlockShape> shapes_with_gaps() {
+  std::vector<BlockShape> shapes;
+  const Vector3i places[] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 0}, {1, 0, 0}, {2, 1, 2}, {3, 1, 2},
+                             {6, 0, 0}, {6, 1, 0}, {7, 0, 0}, {7, 2, 1}, {8, 0, 0}, {8, 2, 2}};
+  for (const Vector3i& place : places) {
+    BlockShape shape;
+    shape.origin = TensorBlock::size * place;
+    for (int i = 0; i < TensorBlock::voxels; ++i)
+      shape.active[i] = place.x() < 8 ? i % 11 != 3 : TensorBlock::position(i).x() == 0;
+    shapes.push_back(shape);
+  }
+  return shapes;
+}
+
+struct MadeBricks {
+  BrickMemory bricks;
+  std::vector<float> strongest;
+};
+
+/// Bricks that are made slab by slab, over blocks that are not needed any more. @param most  Places of a slab.
+MadeBricks make_by_slabs(const BlockTable& table, const Interpolant& interpolant, bool symmetric, std::size_t most) {
+  const int components = symmetric ? TensorBrick::symmetric : TensorBrick::general;
+  const AlignedBox3i extent = active_box(table.shapes);
+  CoefficientBricks bricks = coefficient_bricks(table, extent, interpolant);
+  bricks.slabs = slabs_of(bricks.places, most);
+  MadeBricks made{brick_memory({bricks}, interpolant.between, components), {}};
+  const BrickMemory blocks = blocks_within(made.bricks, bricks);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  for (std::size_t i = 0; i < table.places.size(); ++i) {
+    TensorBlock block{};
+    for (int voxel = 0; voxel < TensorBlock::voxels; ++voxel)
+      if (table.shapes[i].active[voxel]) {
+        const Matrix3f T = Matrix3f::NullaryExpr([&] { return uniform(random); });
+        block.values[voxel] = symmetric ? Matrix3f(T + T.transpose()) : T;
+      }
+    EXPECT_TRUE(place_values(block, components, blocks.brick(bricks.index.find(table.places[i]))));
+  }
+  const Coefficients field{bricks, extent, interpolant, blocks};
+  continue_values(field);
+  made.strongest = make_coefficients(field, made.bricks);
+  keep_bricks(made.bricks, bricks.count);
+  return made;
+}
+
+TEST(CoefficientSlabs, OfAnySizeGiveTheSameBricks) {
+  const std::vector<BlockShape> shapes = shapes_with_gaps();
+  const BlockTable table(shapes);
+  for (const Interpolant& interpolant : {Interpolant{}, fading, extending})
+    for (const bool symmetric : {true, false}) {
+      const MadeBricks whole = make_by_slabs(table, interpolant, symmetric, 1 << 20);
+      ASSERT_GT(whole.bricks.count, 20u);
+      for (const std::size_t most : {1, 12, 30}) {
+        const MadeBricks made = make_by_slabs(table, interpolant, symmetric, most);
+        ASSERT_EQ(made.bricks.count, whole.bricks.count);
+        EXPECT_EQ(made.strongest, whole.strongest) << most;
+        EXPECT_TRUE(std::equal(whole.bricks.brick(0), whole.bricks.brick(whole.bricks.count), made.bricks.brick(0)))
+            << "slabs of " << most << " places";
+      }
+    }
 }
 
 }  // namespace

@@ -85,27 +85,23 @@ void expect_numbers(const Deque& numbers, int first) {
   }
 }
 
-Deque make(int first, int count) {
-  Deque numbers;
-  for (int i = first; i < first + count; ++i) {
+void append(Deque& numbers, int first, int end) {
+  for (int i = first; i < end; ++i) {
     numbers.emplace_back().number = i;
     numbers.back().filling[4599] = -i;
   }
-  return numbers;
 }
 
 TEST(SlotMemory, HoldsWhatADequeDoesToIt) {
   tbb::parallel_for(0, 4, [](int thread) {
     const int first = 10000 * thread;
-    Deque numbers = make(first, 1000);  // More than a slab.
+    Deque numbers;
+    append(numbers, first, first + 1000);  // More than a slab.
     const Deque copy = numbers;
     for (int i = 0; i < 300; ++i) numbers.pop_front();
     numbers.erase(numbers.end() - 50, numbers.end());
     expect_numbers(numbers, first + 300);
-    for (int i = first + 950; i < first + 1200; ++i) {
-      numbers.emplace_back().number = i;
-      numbers.back().filling[4599] = -i;
-    }
+    append(numbers, first + 950, first + 1200);
     expect_numbers(numbers, first + 300);
     expect_numbers(copy, first);
     numbers = copy;
@@ -117,7 +113,8 @@ TEST(SlotMemory, IsGivenBackWhileTheRestIsUsed) {
   if (has_thread_sanitizer) GTEST_SKIP() << "the sanitizer's own memory is larger";
   constexpr double slab = 1 << 23;
   const auto before = static_cast<double>(own_bytes());
-  Deque numbers = make(0, 5000);
+  Deque numbers;
+  append(numbers, 0, 5000);
   EXPECT_GT(static_cast<double>(own_bytes()) - before, 5000 * sizeof(Large) - slab);
   for (int i = 0; i < 4500; ++i) numbers.pop_front();
   EXPECT_LT(static_cast<double>(own_bytes()) - before, 500 * sizeof(Large) + 3 * slab);

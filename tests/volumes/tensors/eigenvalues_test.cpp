@@ -3,7 +3,6 @@
 #include <random>
 
 #include <Eigen/LU>
-#include <tbb/global_control.h>
 
 #include "tests/volumes/grid_support.h"
 
@@ -11,10 +10,6 @@ namespace tensorray {
 namespace {
 
 constexpr Eigenvalues both[] = {Eigenvalues::absolute, Eigenvalues::positive};
-
-Matrix3d matrix(std::initializer_list<double> rows) {
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.begin());
-}
 
 class RandomTensors {
  public:
@@ -25,7 +20,7 @@ class RandomTensors {
     const Matrix3d half = general();
     return half + half.transpose();
   }
-  Eigen::Matrix3d rotation() {
+  Matrix3d rotation() {
     const Eigen::Vector4d q = Eigen::Vector4d::NullaryExpr([&] { return normal_(engine_); });
     return Eigen::Quaterniond(q).normalized().toRotationMatrix();
   }
@@ -37,7 +32,7 @@ class RandomTensors {
 };
 
 /// The pair a ± b i beside the real eigenvalue c.
-Matrix3d pair_block(double a, double b, double c) { return matrix({a, -b, 0, b, a, 0, 0, 0, c}); }
+Matrix3d pair_block(double a, double b, double c) { return by_rows({a, -b, 0, b, a, 0, 0, 0, c}); }
 
 /// What becomes of such a block.
 Matrix3d changed_pair(double a, double b, double c, Eigenvalues mode) {
@@ -119,18 +114,18 @@ TEST(Eigenvalues, OfDefectiveTensors) {
   };
   RandomTensors random;
   const Matrix3d zero = Matrix3d::Zero(), rotation = random.rotation();
-  const Matrix3d two = matrix({2, 1, 0, 0, 2, 0, 0, 0, 5}), three = matrix({2, 1, 0, 0, 2, 1, 0, 0, 2});
-  const Matrix3d negative = matrix({-2, 1, 0, 0, -2, 0, 0, 0, -5}), mixed = matrix({-2, 1, 0, 0, -2, 0, 0, 0, 5});
-  const Matrix3d shear = matrix({0, 0, 3, 0, 0, 0, 0, 0, 0}), chain = matrix({0, 1, 0, 0, 0, 1, 0, 0, 0});
+  const Matrix3d two = by_rows({2, 1, 0, 0, 2, 0, 0, 0, 5}), three = by_rows({2, 1, 0, 0, 2, 1, 0, 0, 2});
+  const Matrix3d negative = by_rows({-2, 1, 0, 0, -2, 0, 0, 0, -5}), mixed = by_rows({-2, 1, 0, 0, -2, 0, 0, 0, 5});
+  const Matrix3d shear = by_rows({0, 0, 3, 0, 0, 0, 0, 0, 0}), chain = by_rows({0, 1, 0, 0, 0, 1, 0, 0, 0});
   const Row table[] = {
       {"zero", zero, zero, 0, false},
       {"a Jordan block", two, two, 1e-12},
       {"a threefold one", three, three, 1e-12},
       {"a negative one", negative, -negative, 1e-12},
-      {"of both signs", mixed, matrix({2, -1, 0, 0, 2, 0, 0, 0, 5}), 1e-7},
+      {"of both signs", mixed, by_rows({2, -1, 0, 0, 2, 0, 0, 0, 5}), 1e-7},
       {"nilpotent", shear, zero, 0},
       {"nilpotent of degree 3", chain, zero, 0},
-      {"nilpotent with a stretch", matrix({0, 0, 3, 0, 7, 0, 0, 0, 0}), Vector3d(0, 7, 0).asDiagonal(), 1e-12},
+      {"nilpotent with a stretch", by_rows({0, 0, 3, 0, 7, 0, 0, 0, 0}), Vector3d(0, 7, 0).asDiagonal(), 1e-12},
       {"turned shear", rotation * shear * rotation.transpose(), zero, 1e-7},
       {"turned chain", rotation * chain * rotation.transpose(), zero, 1e-7}};
   for (const Row& row : table)
@@ -163,7 +158,7 @@ TEST(Eigenvalues, AlmostSimpleShearBecomesIsotropic) {
   for (const Eigenvalues mode : both)
     for (double epsilon = 0.1; epsilon > 1e-16; epsilon /= 10) {
       // In the (x, z) plane, with an eigenvalue of zero perpendicular to it.
-      const Matrix3d shear = matrix({0, 0, k, 0, 0, 0, epsilon, 0, 0});
+      const Matrix3d shear = by_rows({0, 0, k, 0, 0, 0, epsilon, 0, 0});
       const Matrix3d expected = std::sqrt(k * epsilon) * Vector3d(1, 0, 1).asDiagonal().toDenseMatrix();
       EXPECT_LE((with_eigenvalues(shear, mode) - expected).norm(), 1.5e-6 * k) << epsilon;
     }
@@ -174,7 +169,7 @@ TEST(Eigenvalues, AntisymmetricTensors) {
   for (int i = 0; i < 100; ++i) {
     const Vector3d axis = random.rotation() * Vector3d::UnitX();
     const double rate = std::pow(10, random.exponent(-6, 6));
-    const Matrix3d tensor = rate * matrix({0, -axis.z(), axis.y(), axis.z(), 0, -axis.x(), -axis.y(), axis.x(), 0});
+    const Matrix3d tensor = rate * by_rows({0, -axis.z(), axis.y(), axis.z(), 0, -axis.x(), -axis.y(), axis.x(), 0});
     const Matrix3d across = Matrix3d::Identity() - axis * axis.transpose();
     bool defective = false;
     EXPECT_LE((with_eigenvalues(tensor, Eigenvalues::absolute, &defective) - rate * across).norm(), 1e-12 * rate);
@@ -186,12 +181,12 @@ TEST(Eigenvalues, AntisymmetricTensors) {
 
 TEST(Eigenvalues, NearDefectiveTensorsStayBounded) {
   RandomTensors random;
-  const Matrix3d blocks[] = {matrix({0, 1, 0, 0, 0, 1, 0, 0, 0}), matrix({1, 1, 0, 0, 1, 1, 0, 0, 1}),
-                             matrix({0, 1, 0, 0, 0, 0, 0, 0, 0}), matrix({0, 1, 0, 0, 0, 0, 0, 0, 1})};
+  const Matrix3d blocks[] = {by_rows({0, 1, 0, 0, 0, 1, 0, 0, 0}), by_rows({1, 1, 0, 0, 1, 1, 0, 0, 1}),
+                             by_rows({0, 1, 0, 0, 0, 0, 0, 0, 0}), by_rows({0, 1, 0, 0, 0, 0, 0, 0, 1})};
   for (int i = 0; i < 40000; ++i) {
     const Matrix3d rotation = random.rotation();
     const Matrix3d noise = std::pow(10, random.exponent(-18, -1)) * random.general();
-    const Eigen::Matrix3f single = (rotation * (blocks[i % 4] + noise) * rotation.transpose()).cast<float>();
+    const Matrix3f single = (rotation * (blocks[i % 4] + noise) * rotation.transpose()).cast<float>();
     const Matrix3d tensor = single.cast<double>();
     for (const Eigenvalues mode : both) {
       const Matrix3d result = with_eigenvalues(tensor, mode);
@@ -201,8 +196,8 @@ TEST(Eigenvalues, NearDefectiveTensorsStayBounded) {
   }
 }
 
-TensorGrid grid_of(const std::function<Matrix3d(const Eigen::Vector3i&)>& value) {
-  return dense_grid({Eigen::Vector3i(-3, 0, 5), Eigen::Vector3i(20, 17, 30)}, Eigen::Affine3d::Identity(), value);
+TensorGrid grid_of(const std::function<Matrix3d(const Vector3i&)>& value) {
+  return unit_voxels({-3, 0, 5}, {20, 17, 30}, value);
 }
 
 TEST(ApplyEigenvalues, AutomaticIsAbsoluteForSymmetricFieldsOnly) {
@@ -211,9 +206,9 @@ TEST(ApplyEigenvalues, AutomaticIsAbsoluteForSymmetricFieldsOnly) {
   EXPECT_EQ(absolute.chosen, Eigenvalues::absolute);
   EXPECT_NEAR(absolute.norm_lost, 0, 1e-12);
   EXPECT_EQ(absolute.defective, 0u);
-  EXPECT_EQ(symmetric.blocks.front().values[511], Eigen::Matrix3f(Eigen::Vector3f(1, 1, 1).asDiagonal()));
+  EXPECT_EQ(symmetric.blocks.front().values[511], Matrix3f(Vector3f(1, 1, 1).asDiagonal()));
 
-  TensorGrid general = grid_of([](const auto&) { return matrix({-1, 1, 0, 0, -1, 0, 0, 0, -1}); });
+  TensorGrid general = grid_of([](const auto&) { return by_rows({-1, 1, 0, 0, -1, 0, 0, 0, -1}); });
   const TensorGrid before = general;
   const EigenvalueReport raw = apply_eigenvalues(general, Eigenvalues::automatic);
   EXPECT_EQ(raw.chosen, Eigenvalues::raw);
@@ -224,8 +219,8 @@ TEST(ApplyEigenvalues, AutomaticIsAbsoluteForSymmetricFieldsOnly) {
 TEST(ApplyEigenvalues, CountsDefectiveVoxelsAndLostNorm) {
   // Half of the voxels hold a simple shear, half a rotation of the same norm. Both are erased, although the rotation
   // becomes a strain of the same size.
-  const auto value = [](const Eigen::Vector3i& i) {
-    return i.y() % 2 == 0 ? matrix({0, 0, std::sqrt(2.0), 0, 0, 0, 0, 0, 0}) : matrix({0, -1, 0, 1, 0, 0, 0, 0, 0});
+  const auto value = [](const Vector3i& i) {
+    return i.y() % 2 == 0 ? by_rows({0, 0, std::sqrt(2.0), 0, 0, 0, 0, 0, 0}) : by_rows({0, -1, 0, 1, 0, 0, 0, 0, 0});
   };
   TensorGrid grid = grid_of(value);
   const std::size_t voxels = grid.active_voxels();
@@ -243,16 +238,16 @@ Matrix3d any_kind(RandomTensors& random, int kind) {
   static const Matrix3d special[] = {
       Matrix3d::Zero(),
       Matrix3d::Identity(),
-      matrix({2, 1, 0, 0, 2, 0, 0, 0, 5}),  // Jordan blocks.
-      matrix({-2, 1, 0, 0, -2, 1, 0, 0, -2}),
-      matrix({-2, 1, 0, 0, -2, 0, 0, 0, 5}),
-      matrix({0, 0, 3, 0, 7, 0, 0, 0, 0}),
-      matrix({0, 1, 0, 0, 0, 1, 0, 0, 0}),
-      matrix({0, 0, 3, 0, 0, 0, 1e-5, 0, 0}),  // Almost a simple shear.
-      matrix({0, -2, 0, 2, 0, 0, 0, 0, 0}),    // Pairs: on the cut of `positive`, and on both sides of it.
-      matrix({0, -2, 0, 2, 0, 0, 0, 0, -3}),
-      matrix({-1, -2, 0, 2, -1, 0, 0, 0, 3}),
-      matrix({1, -2, 0, 2, 1, 0, 0, 0, -3}),
+      by_rows({2, 1, 0, 0, 2, 0, 0, 0, 5}),  // Jordan blocks.
+      by_rows({-2, 1, 0, 0, -2, 1, 0, 0, -2}),
+      by_rows({-2, 1, 0, 0, -2, 0, 0, 0, 5}),
+      by_rows({0, 0, 3, 0, 7, 0, 0, 0, 0}),
+      by_rows({0, 1, 0, 0, 0, 1, 0, 0, 0}),
+      by_rows({0, 0, 3, 0, 0, 0, 1e-5, 0, 0}),  // Almost a simple shear.
+      by_rows({0, -2, 0, 2, 0, 0, 0, 0, 0}),    // Pairs: on the cut of `positive`, and on both sides of it.
+      by_rows({0, -2, 0, 2, 0, 0, 0, 0, -3}),
+      by_rows({-1, -2, 0, 2, -1, 0, 0, 0, 3}),
+      by_rows({1, -2, 0, 2, 1, 0, 0, 0, -3}),
       Vector3d(3, 3, -2).asDiagonal(),
       Vector3d(1, 0, 0).asDiagonal(),
       Vector3d(-1, 1, 0).asDiagonal(),
@@ -272,18 +267,11 @@ Matrix3d any_kind(RandomTensors& random, int kind) {
 /// Fields are preprocessed in vectors, tensors one by one. Both are in double precision.
 TEST(ApplyEigenvalues, AgreesWithSingleTensors) {
   RandomTensors random;
-  std::vector<Matrix3d> tensors;
-  for (int i = 0; i < 24 * 18 * 26; ++i) tensors.push_back(any_kind(random, i).cast<float>().cast<double>());
-  const auto at = [&](const Eigen::Vector3i& i) {
-    return tensors[static_cast<std::size_t>(((i.x() + 3) * 18 + i.y()) * 26 + i.z() - 5)];
-  };
+  TensorGrid before = grid_of([](const auto&) { return Matrix3d::Zero(); });
+  int kind = 0;
+  for_each_value(before, [&](Matrix3f& value) { value = any_kind(random, kind++).cast<float>(); });
   for (const Eigenvalues mode : both) {
-    TensorGrid grid;
-    {
-      const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
-      grid = grid_of(at);
-    }
-    const TensorGrid before = grid;
+    TensorGrid grid = before;
     const EigenvalueReport report = apply_eigenvalues(grid, mode);
     std::size_t defective = 0;
     double norm = 0, erased = 0;

@@ -7,7 +7,7 @@
 #include <tbb/global_control.h>
 
 #include "base/constants.h"
-#include "tests/names.h"
+#include "tests/volumes/grid_support.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/making/generators.h"
 #include "volumes/tensors/invariants.h"
@@ -18,17 +18,19 @@ namespace {
 
 const Vector3d center(0.11, -0.07, 0.05);
 
+Matrix3d diagonal(double a, double b, double c) { return Vector3d(a, b, c).asDiagonal(); }
+
 /// T = |P − c| I: its greatest eigenvalue is the distance from c.
-TensorField distance_field(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world) {
+TensorField distance_field(const AlignedBox3i& box, const Affine3d& to_world) {
   return TensorField(dense_grid(box, to_world, [&](const Vector3i& index) {
     const double distance = (to_world * index.cast<double>() - center).norm();
-    return Eigen::Matrix3d(distance * Eigen::Matrix3d::Identity());
+    return Matrix3d(distance * Matrix3d::Identity());
   }));
 }
 
 /// The cube from −1 to 1 with 2 n + 1 voxels along an edge.
 TensorField cube(int n) {
-  return distance_field({Vector3i::Constant(-n), Vector3i::Constant(n)}, Eigen::Affine3d(Eigen::Scaling(1.0 / n)));
+  return distance_field({Vector3i::Constant(-n), Vector3i::Constant(n)}, Affine3d(Eigen::Scaling(1.0 / n)));
 }
 
 using Triangle = std::array<std::uint32_t, 3>;
@@ -79,15 +81,10 @@ TEST(IsosurfaceTest, SphereOfSecondOrder) {
 }
 
 TEST(IsosurfaceTest, AnyAffineTransform) {
-  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
-  to_world.translate(Vector3d(0.1, 0, -0.1)).rotate(Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()));
-  to_world.scale(Vector3d(0.05, 0.08, 0.04));
-  Eigen::Matrix3d shear = Eigen::Matrix3d::Identity();
-  shear(0, 1) = 0.3;
-  to_world.linear() *= shear;
-  Eigen::Affine3d mirrored = to_world;
+  const Affine3d to_world(0.09 * sheared_transform().linear());  // Edges of voxels are shorter than 0.08.
+  Affine3d mirrored = to_world;
   mirrored.linear().col(1) *= -1;
-  for (const Eigen::Affine3d& transform : {to_world, mirrored}) {
+  for (const Affine3d& transform : {to_world, mirrored}) {
     const TensorField field = distance_field({Vector3i::Constant(-30), Vector3i::Constant(30)}, transform);
     const Isosurface surface = isosurface(field, Invariant::largest_eigenvalue, 0.7);
     EXPECT_EQ(open_edges(surface.mesh), 0u);
@@ -100,12 +97,10 @@ TEST(IsosurfaceTest, AnyAffineTransform) {
 /// A sphere that extends beyond the extent is cut off there and has no caps. The rest has the area by Archimedes.
 TEST(IsosurfaceTest, IsOpenAtTheFacesOfTheExtentAndEndsOnThem) {
   const int n = 16;
-  const Eigen::AlignedBox3i box(Vector3i(-n, -n, -n), Vector3i(4, n, n));
-  const TensorField field = distance_field(box, Eigen::Affine3d(Eigen::Scaling(1.0 / n)));
+  const AlignedBox3i box(Vector3i(-n, -n, -n), Vector3i(4, n, n));
+  const TensorField field = distance_field(box, Affine3d(Eigen::Scaling(1.0 / n)));
   const Isosurface surface = isosurface(field, Invariant::largest_eigenvalue, 0.6);
-  double furthest = -1;
-  for (const Vector3d& vertex : surface.mesh.vertices) furthest = std::max(furthest, vertex.x());
-  EXPECT_EQ(furthest, 0.25);
+  EXPECT_EQ(surface.mesh.bounds().max().x(), 0.25);
   EXPECT_GT(open_edges(surface.mesh), 40u);
   const double exact = 2 * pi * 0.6 * (0.25 - center.x() + 0.6);
   EXPECT_NEAR(area(surface), exact, exact * 0.02);
@@ -114,17 +109,15 @@ TEST(IsosurfaceTest, IsOpenAtTheFacesOfTheExtentAndEndsOnThem) {
 
 /// Missing voxels are zero, far from the faces of the extent: a block has a surface half a voxel outside it.
 TEST(IsosurfaceTest, InactiveVoxelsCountAsZero) {
-  TensorGrid grid = dense_grid({Vector3i(-4, 12, -4), Vector3i(4, 20, 4)}, Eigen::Affine3d::Identity(),
-                               [](const Vector3i&) { return Eigen::Matrix3d(2 * Eigen::Matrix3d::Identity()); });
+  const auto isotropic = [](double value) { return [=](const Vector3i&) { return diagonal(value, value, value); }; };
+  TensorGrid grid = unit_voxels({-4, 12, -4}, {4, 20, 4}, isotropic(2));
   for (const int at : {-100, 100}) {
-    const TensorGrid far =
-        dense_grid({Vector3i::Constant(at), Vector3i::Constant(at)}, Eigen::Affine3d::Identity(),
-                   [](const Vector3i&) { return Eigen::Matrix3d(0.5 * Eigen::Matrix3d::Identity()); });
+    const TensorGrid far = unit_voxels(Vector3i::Constant(at), Vector3i::Constant(at), isotropic(0.5));
     grid.blocks.insert(at < 0 ? grid.blocks.begin() : grid.blocks.end(), far.blocks.begin(), far.blocks.end());
   }
   const Isosurface surface = isosurface(TensorField(grid), Invariant::trace, 3);
   EXPECT_EQ(open_edges(surface.mesh), 0u);
-  const Eigen::AlignedBox3d box = surface.mesh.bounds();
+  const AlignedBox3d box = surface.mesh.bounds();
   EXPECT_LT((box.min() - Vector3d(-4.5, 11.5, -4.5)).norm(), 1e-5);
   EXPECT_LT((box.max() - Vector3d(4.5, 20.5, 4.5)).norm(), 1e-5);
   for (const Triangle& t : surface.mesh.triangles)
@@ -141,21 +134,17 @@ TEST(IsosurfaceTest, EmptyWhereNothingIsOnTheOtherSide) {
 
 TEST(IsosurfaceTest, RefusesWhatHasNoSurface) {
   EXPECT_THROW(isosurface(cube(2), Invariant::norm, std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
-  const TensorField flat = distance_field({Vector3i(0, 0, 0), Vector3i(4, 4, 0)}, Eigen::Affine3d::Identity());
+  const TensorField flat = distance_field({Vector3i(0, 0, 0), Vector3i(4, 4, 0)}, Affine3d::Identity());
   EXPECT_THROW(isosurface(flat, Invariant::norm, 1), std::invalid_argument);
 }
 
-Matrix3d matrix_of_rows(std::initializer_list<double> rows) {
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.begin());
-}
-
 TensorGrid stretched_grid(const std::function<Matrix3d(const Vector3i&)>& value) {
-  const Eigen::Affine3d to_world = Eigen::Translation3d(1, 2, 3) * Eigen::Scaling(0.5, 1.0, 2.0);
+  const Affine3d to_world = Eigen::Translation3d(1, 2, 3) * Eigen::Scaling(0.5, 1.0, 2.0);
   return dense_grid({Vector3i(-2, 0, 0), Vector3i(7, 9, 9)}, to_world, value);
 }
 
 TEST(FieldStatistics, DescribesTheExtent) {
-  const TensorGrid grid = stretched_grid([](const Vector3i&) { return Matrix3d::Identity(); });
+  const TensorGrid grid = stretched_grid([](const Vector3i&) { return diagonal(1, 1, 1); });
   const FieldStatistics s = field_statistics(grid);
   EXPECT_EQ(s.active_voxels, 1000u);
   EXPECT_EQ(s.non_finite, 0u);
@@ -170,9 +159,8 @@ TEST(FieldStatistics, DescribesTheExtent) {
 
 TEST(FieldStatistics, PercentilesOfTheNorm) {
   // Norms 0 … 999, each once.
-  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
-    const double n = (i.x() + 2) * 100 + i.y() * 10 + i.z();
-    return n / std::sqrt(3.0) * Matrix3d::Identity();
+  const TensorGrid grid = stretched_grid([](const Vector3i& i) {
+    return Matrix3d(((i.x() + 2) * 100 + i.y() * 10 + i.z()) / std::sqrt(3.0) * Matrix3d::Identity());
   });
   const std::array<double, 7> expected{0, 10, 250, 500, 749, 989, 999};
   const FieldStatistics s = field_statistics(grid);
@@ -182,9 +170,8 @@ TEST(FieldStatistics, PercentilesOfTheNorm) {
 TEST(FieldStatistics, EigenvaluesAndFractions) {
   // A tenth of the voxels (x = −2) has the eigenvalues −1 ± 3i and 4. The others are diag(5, 0, 0), neither complex nor
   // negative.
-  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
-    if (i.x() == -2) return matrix_of_rows({-1, -3, 0, 3, -1, 0, 0, 0, 4});
-    return Vector3d(5, 0, 0).asDiagonal();
+  const TensorGrid grid = stretched_grid([](const Vector3i& i) {
+    return i.x() == -2 ? by_rows({-1, -3, 0, 3, -1, 0, 0, 0, 4}) : diagonal(5, 0, 0);
   });
   const FieldStatistics s = field_statistics(grid);
   EXPECT_NEAR(s.real_min, -1, 1e-12);
@@ -205,9 +192,8 @@ TEST(FieldStatistics, EigenvaluesAndFractions) {
 
 TEST(FieldStatistics, LeavesNonFiniteVoxelsOut) {
   const auto statistics = [](int first) {  // Of a field that is not finite from x = first on.
-    return field_statistics(stretched_grid([=](const Vector3i& i) -> Matrix3d {
-      return (i.x() >= first ? std::numeric_limits<double>::quiet_NaN() : 2.0) * Matrix3d::Identity();
-    }));
+    return field_statistics(
+        stretched_grid([=](const Vector3i& i) { return diagonal(i.x() >= first ? NAN : 2, 2, 2); }));
   };
   const FieldStatistics some = statistics(5), none = statistics(-2);
   EXPECT_EQ(some.active_voxels, 1000u);
@@ -230,14 +216,6 @@ TEST(FieldStatistics, DoesNotDependOnThreads) {
   EXPECT_EQ(many.absolute_loss, one.absolute_loss);
   EXPECT_EQ(many.deviator_max, one.deviator_max);
   EXPECT_EQ(many.complex_fraction, one.complex_fraction);
-}
-
-Matrix3d diagonal(double a, double b, double c) { return Vector3d(a, b, c).asDiagonal(); }
-
-Matrix3d cross_matrix(const Vector3d& axis) {
-  Matrix3d matrix;
-  for (int i = 0; i < 3; ++i) matrix.col(i) = axis.cross(Vector3d::Unit(i));
-  return matrix;
 }
 
 double of(const std::string& name, const Matrix3d& tensor) { return invariant(invariant_of(name), tensor); }
@@ -271,22 +249,19 @@ TEST(InvariantTest, AnisotropyOfLinePlaneAndSphere) {
 }
 
 TEST(InvariantTest, RotationAndShear) {
-  const Matrix3d rotation = cross_matrix({1, -2, 2});
-  EXPECT_NEAR(of("vorticity", rotation), 6, 1e-14);  // Twice the rate of rotation.
+  const Matrix3d rotation = by_rows({0, -2, -2, 2, 0, -1, 2, 1, 0});  // About (1, −2, 2).
+  EXPECT_NEAR(of("vorticity", rotation), 6, 1e-14);                   // Twice the rate of rotation.
   EXPECT_NEAR(of("swirling_strength", rotation), 3, 1e-14);
   EXPECT_NEAR(of("asymmetry", rotation), 2, 1e-15);
   EXPECT_EQ(of("fractional_anisotropy", rotation), 0);
   EXPECT_EQ(of("max_shear", rotation), 0);
-  Matrix3d shear = Matrix3d::Zero();
-  shear(0, 2) = 4;
+  const Matrix3d shear = by_rows({0, 0, 4, 0, 0, 0, 0, 0, 0});
   EXPECT_NEAR(of("vorticity", shear), 4, 1e-14);
   EXPECT_NEAR(of("max_shear", shear), 2, 1e-14);
   EXPECT_NEAR(of("von_mises", shear), 2 * std::sqrt(3.0), 1e-14);
   EXPECT_NEAR(of("asymmetry", shear), std::sqrt(2.0), 1e-15);
   // A pair 1 ± 2i and 5: ordered by real parts.
-  Matrix3d spiral = diagonal(1, 1, 5);
-  spiral(0, 1) = -2;
-  spiral(1, 0) = 2;
+  const Matrix3d spiral = by_rows({1, -2, 0, 2, 1, 0, 0, 0, 5});
   EXPECT_NEAR(of("largest_eigenvalue", spiral), 5, 1e-14);
   EXPECT_NEAR(of("smallest_eigenvalue", spiral), 1, 1e-14);
   EXPECT_NEAR(of("swirling_strength", spiral), 2, 1e-14);

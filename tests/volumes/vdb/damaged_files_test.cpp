@@ -1,5 +1,3 @@
-#include <cstring>
-#include <functional>
 #include <limits>
 #include <random>
 #include <tuple>
@@ -23,9 +21,7 @@ void expect_all_truncations_fail(const std::string& bytes, const std::string& la
   const Temporary path("short.vdb");
   for (const std::size_t length : lengths) {
     write_bytes(path, bytes.substr(0, length));
-    EXPECT_THAT([&] { read_tensor_vdb(path); },
-                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), Not(HasSubstr("\n")))))
-        << label << " " << length;
+    EXPECT_THAT([&] { read_tensor_vdb(path); }, fails_with(path.string())) << label << " " << length;
     EXPECT_THROW(list_vdb(path), std::runtime_error) << label << " " << length;
   }
 }
@@ -40,10 +36,16 @@ TEST(DamagedFiles, TruncationIsNoticed) {
          std::initializer_list<std::uint32_t>{COMPRESS_NONE, COMPRESS_ACTIVE_MASK, COMPRESS_ZIP | COMPRESS_ACTIVE_MASK,
                                               COMPRESS_BLOSC | COMPRESS_ACTIVE_MASK}) {
       write_stock(recompressed, grids, compression);
-      expect_same_blocks(read_tensor_vdb(recompressed), read_tensor_vdb(path));
       expect_all_truncations_fail(bytes_of(recompressed), compressionToString(compression));
     }
   }
+}
+
+/// Bytes with another length at a place.
+std::string with_length(std::string bytes, std::size_t at, std::int64_t length) {
+  std::string number;
+  append_number(length, ByteOrder::little, number);
+  return bytes.replace(at, number.size(), number);
 }
 
 TEST(DamagedFiles, LengthsOfZipThatAreTooLarge) {
@@ -58,37 +60,9 @@ TEST(DamagedFiles, LengthsOfZipThatAreTooLarge) {
     while (read_number<std::uint64_t>(&bytes.at(chunk - 8), ByteOrder::little) > 12 * TensorBlock::voxels)
       chunk = bytes.rfind("\x78\x9c", chunk - 1);
     for (const std::int64_t length : {std::int64_t{1} << 21, std::int64_t{1} << 31, std::int64_t{1} << 40}) {
-      std::string number;
-      append_number(length, ByteOrder::little, number);
-      write_bytes(damaged, std::string(bytes).replace(chunk - 8, 8, number));
-      std::filesystem::resize_file(damaged, bytes.size() + 100);
+      write_bytes(damaged, with_length(bytes, chunk - 8, length) + std::string(100, '\0'));
       EXPECT_THROW(read_tensor_vdb(damaged), std::runtime_error) << length << " " << mask;
     }
-  }
-}
-
-/// What a TensorGrid promises (tensor_grid.h), whatever the file says.
-void expect_sound(const TensorGrid& grid) {
-  const Eigen::Vector3i* before = nullptr;
-  for (const TensorBlock& block : grid.blocks) {
-    EXPECT_TRUE(block.active.any());
-    EXPECT_TRUE(block.origin.unaryExpr([](int i) { return i & (TensorBlock::size - 1); }).isZero());
-    const auto key = [](const Eigen::Vector3i& at) { return std::make_tuple(at.x(), at.y(), at.z()); };
-    EXPECT_TRUE(!before || key(*before) < key(block.origin));
-    before = &block.origin;
-    bool is_zero_elsewhere = true;
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-      is_zero_elsewhere = is_zero_elsewhere && (block.active[offset] || block.values[offset].isZero(0));
-    EXPECT_TRUE(is_zero_elsewhere) << block.origin.transpose();
-  }
-}
-
-/// Values that are made of what happens to be in memory differ from one reading to the next.
-void expect_same_bits(const TensorGrid& a, const TensorGrid& b) {
-  ASSERT_EQ(a.blocks.size(), b.blocks.size());
-  for (std::size_t i = 0; i < a.blocks.size(); ++i) {
-    EXPECT_EQ(a.blocks[i].active, b.blocks[i].active);
-    EXPECT_EQ(std::memcmp(&a.blocks[i].values, &b.blocks[i].values, sizeof a.blocks[i].values), 0);
   }
 }
 
@@ -113,10 +87,11 @@ TEST_P(FlippedBytes, NeverCrash) {
     try {
       const TensorGrid grid = read_tensor_vdb(damaged);
       expect_sound(grid);
-      if (grid.blocks.size() < 1000) expect_same_bits(grid, read_tensor_vdb(damaged));  // Others have large tiles.
+      // Values that are made of what happens to be in memory differ from one reading to the next.
+      if (grid.blocks.size() < 1000) expect_same_blocks(grid, read_tensor_vdb(damaged));  // Others have large tiles.
     } catch (const std::runtime_error& error) {
       ++refused;
-      EXPECT_THAT(error.what(), AllOf(HasSubstr(damaged.string()), testing::Not(HasSubstr("\n"))));
+      EXPECT_THAT(error.what(), AllOf(HasSubstr(damaged.string()), Not(HasSubstr("\n"))));
     }
   }
   EXPECT_GT(refused, 0);
@@ -143,15 +118,11 @@ TEST(DamagedFiles, WrongLengthsInTreesAreNoticed) {
     if (length != read_number<std::uint32_t>(&bytes[std::min(at + 12, bytes.size() - 4)], ByteOrder::little)) continue;
     ++chunks;
     if (chunks % 7 != 1) continue;
+    constexpr std::int64_t zero = 0, large = std::int64_t{1} << 40, greatest = std::numeric_limits<std::int64_t>::max();
     for (const std::int64_t wrong :
-         {std::int64_t{0}, -length, length - 1, length + 1, -length * 1000, std::int64_t{1} << 40,
-          -(std::int64_t{1} << 40), std::numeric_limits<std::int64_t>::max(),
-          std::numeric_limits<std::int64_t>::min()}) {
-      std::string number;
-      append_number(wrong, ByteOrder::little, number);
-      write_bytes(damaged, std::string(bytes).replace(at - 8, 8, number));
-      EXPECT_THAT([&] { read_tensor_vdb(damaged); }, ThrowsMessage<std::runtime_error>(HasSubstr(damaged.string())))
-          << at << " " << wrong;
+         {zero, -length, length - 1, length + 1, -length * 1000, large, -large, greatest, -greatest - 1}) {
+      write_bytes(damaged, with_length(bytes, at - 8, wrong));
+      EXPECT_THAT([&] { read_tensor_vdb(damaged); }, fails_with(damaged.string())) << at << " " << wrong;
     }
   }
   EXPECT_GT(chunks, 20);
@@ -160,9 +131,8 @@ TEST(DamagedFiles, WrongLengthsInTreesAreNoticed) {
 TEST(DamagedFiles, NotVdbFiles) {
   const Temporary path("a.vdb");
   const auto expect = [&](const fs::path& file, const std::string& what) {
-    for (const auto& read :
-         {std::function<void()>([&] { read_tensor_vdb(file); }), std::function<void()>([&] { list_vdb(file); })})
-      EXPECT_THAT(read, ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(file.string()), HasSubstr(what))));
+    EXPECT_THAT([&] { read_tensor_vdb(file); }, fails_with(file.string(), what));
+    EXPECT_THAT([&] { list_vdb(file); }, fails_with(file.string(), what));
   };
   expect(Temporary("missing.vdb"), "No such file");
   expect(testing::TempDir(), "is a folder");
@@ -176,10 +146,9 @@ TEST(DamagedFiles, NotVdbFiles) {
   for (char& c : noise) c = static_cast<char>(engine());
   write_bytes(path, noise);
   expect(path, "not an OpenVDB file");
-  const std::int64_t magic = openvdb::OPENVDB_MAGIC;
-  const std::uint32_t format = openvdb::OPENVDB_FILE_VERSION;
-  std::string header(reinterpret_cast<const char*>(&magic), sizeof magic);
-  header.append(reinterpret_cast<const char*>(&format), sizeof format);
+  std::string header;
+  append_number(std::int64_t{openvdb::OPENVDB_MAGIC}, ByteOrder::little, header);
+  append_number(std::uint32_t{openvdb::OPENVDB_FILE_VERSION}, ByteOrder::little, header);
   write_bytes(path, header + noise);
   expect(path, "damaged");
   header.back() = 1;
@@ -205,36 +174,31 @@ TEST(DamagedFiles, ReadsFormatsThatHoldUnknownGrids) {
 /// A tile at the greatest index has no index behind it, where a loop over its blocks could end.
 TEST(DamagedFiles, VoxelsFarAwayAreRefused) {
   constexpr std::int32_t end = std::numeric_limits<std::int32_t>::max();
+  const auto at = [](std::int32_t x) { return openvdb::Coord(x, 0, 0); };
   struct Case {
     const char* what;
-    openvdb::Coord min, max;  ///< Of active voxels.
+    openvdb::Coord first;
+    bool is_tile;
   };
-  const auto at = [](std::int32_t x) { return openvdb::Coord(x, 0, 0); };
-  // OpenVDB's own fill does not end at the greatest index.
-  const auto fill = [](auto& grid, const Case& each, const auto& value) {
-    if (each.min == each.max)
-      grid.tree().setValueOn(each.min, value);
-    else
-      grid.tree().addTile(2, each.min, value, true);
-  };
-  const std::vector<Case> cases{{"tile at the end", openvdb::Coord(end - 127), openvdb::Coord(end)},
-                                {"tile at the beginning", openvdb::Coord(-end - 1), openvdb::Coord(-end - 1 + 127)},
-                                {"voxel at the end", at(end), at(end)},
-                                {"voxel at the beginning", at(-end - 1), at(-end - 1)},
-                                {"voxel just out of range", at((1 << 29) + 8), at((1 << 29) + 8)}};
-  const Temporary path("far.vdb");
-  for (const Case& each : cases)
-    for (const Derive derive : {Derive::none, Derive::hessian}) {
-      const auto scalar = stock_grid<openvdb::FloatGrid>("phi");
-      openvdb::GridPtrVec grids{scalar};
-      fill(*scalar, each, 1.0f);
-      if (derive == Derive::none)
-        grids = stock_rows("phi", [&](auto& grid, int) { fill(grid, each, openvdb::Vec3s(1)); });
-      write_stock(path, grids);
-      EXPECT_THAT([&] { read_tensor_vdb(path, "", derive); },
-                  ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("indices are beyond"))))
-          << each.what;
-    }
+  const Case cases[] = {{"tile at the end", openvdb::Coord(end - 127), true},
+                        {"tile at the beginning", openvdb::Coord(-end - 1), true},
+                        {"voxel at the end", at(end), false},
+                        {"voxel at the beginning", at(-end - 1), false},
+                        {"voxel just out of range", at((1 << 29) + 8), false}};
+  for (const Case& each : cases) {
+    const auto set = [&](auto& grid, const auto& value) {
+      if (each.is_tile)
+        grid.tree().addTile(2, each.first, value, true);  // OpenVDB's own fill does not end at the greatest index.
+      else
+        grid.tree().setValueOn(each.first, value);
+    };
+    const auto rows = stock_rows("T", [&](auto& grid, int) { set(grid, openvdb::Vec3s(1)); });
+    const auto scalar = stock_grid<openvdb::FloatGrid>("phi");
+    set(*scalar, 1.0f);
+    EXPECT_THAT([&] { read_stock(rows); }, fails_with("stock.vdb", "indices are beyond")) << each.what;
+    EXPECT_THAT([&] { read_stock({scalar}, "", Derive::hessian); }, fails_with("stock.vdb", "indices are beyond"))
+        << each.what;
+  }
 }
 
 /// Tiles take a few bytes in the file, and 2 GB each in memory.
@@ -245,8 +209,7 @@ TEST(DamagedFiles, TilesThatFitInNoMemoryAreRefused) {
   const Temporary path("tiles.vdb");
   write_stock(path, {grid});
   EXPECT_LT(fs::file_size(path), 1000000u);
-  EXPECT_THAT([&] { read_tensor_vdb(path, "", Derive::hessian); },
-              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("active voxels need"))));
+  EXPECT_THAT([&] { read_tensor_vdb(path, "", Derive::hessian); }, fails_with(path.string(), "active voxels need"));
 }
 
 TEST(TensorFileWriting, FullDiskIsNoticed) {
