@@ -1,7 +1,6 @@
 #include "tracing/flow/flow_map.h"
 
 #include <cstring>
-#include <functional>
 
 #include "base/constants.h"
 #include "base/process/job.h"
@@ -148,16 +147,8 @@ TEST(FlowMap, InterpolatedLandingsAreThoseOfRays) {
   EXPECT_GT(static_cast<double>(nearest), 0.7 * static_cast<double>(compared)) << "the prediction's own error";
 }
 
-/// Turns all light alike, to the right and upwards.
-Matrix3d turning(const Vector3d&) {
-  Matrix3d tensor = Matrix3d::Zero();
-  tensor(0, 2) = tensor(2, 0) = -0.3;
-  tensor(1, 2) = tensor(2, 1) = -0.15;
-  return tensor;
-}
-
 TEST(FlowMap, SideLightOfARangeIsLeftOutAtEachWavelength) {
-  const LightBench bench = make_bench(turning, plate_at(1.2, 8, 256));
+  const LightBench bench = make_bench([](const Vector3d&) { return sideways({-0.3, -0.15}); }, plate_at(1.2, 8, 256));
   FlowSettings settings = range(0, 1);
   settings.side_light = false;
   const FlowMap map = map_of(bench, settings);
@@ -166,8 +157,7 @@ TEST(FlowMap, SideLightOfARangeIsLeftOutAtEachWavelength) {
   const double fifth = 0.2 * 4 * 2 * 8.0 / 256 / area(bench.beam.aperture);  // Of a pixel, along the silhouette.
   double last = -1;
   for (std::size_t sample = 0; sample < map.wavelengths; sample += 8) {  // Light bends more and more.
-    CausticBand band;
-    band.sample = static_cast<double>(sample);
+    const CausticBand band{static_cast<double>(sample)};
     const double side = power_of(caustic_of(bench, map, {band}), RayEnd::side);
     EXPECT_GT(side, last) << sample;
     EXPECT_NEAR(side, power_of(caustic_of(bench, fine, {band}), RayEnd::side), fifth) << sample;
@@ -189,8 +179,7 @@ TEST(FlowMap, ShadowsOfARangeNeedNoFineQuads) {
   const double tenth = 0.1 * 2 * (0.8 + 0.85) * 3 / 256 / area(bench.beam.aperture);  // Of a pixel, along the edge.
   double squares = 0, all = 0;
   for (const double sample : {3.0, 11.6, 20.0, 28.3}) {
-    CausticBand band;
-    band.sample = sample;
+    const CausticBand band{sample};
     const Caustic light = caustic_of(bench, map, {band}), exact = caustic_of(bench, fine, {band});
     EXPECT_NEAR(power_of(light, RayEnd::obstacle), power_of(exact, RayEnd::obstacle), tenth) << sample;
     for (std::size_t i = 0; i < light.irradiance.values.size(); ++i) {
@@ -201,17 +190,11 @@ TEST(FlowMap, ShadowsOfARangeNeedNoFineQuads) {
   EXPECT_LT(std::sqrt(squares / all), 0.01);
 }
 
-/// Folds light everywhere.
-Matrix3d folds(const Vector3d& at) {
-  Matrix3d tensor = Matrix3d::Zero();
-  tensor(0, 2) = tensor(2, 0) = 0.15 * std::sin(50 * at.x());
-  return tensor;
-}
-
 /// Quads are divided to the last only where some light does not land; elsewhere, folds ask for the last but one.
 TEST(FlowMap, TheLastDivisionIsForEdges) {
   const auto least = [](double finest, bool has_edges) {  // The area of a triangle away from the silhouette.
     const Surfaces surfaces = has_edges ? obstacle_between({-0.5, -0.4, -1.6}, {0.3, 0.45, -1.5}) : Surfaces();
+    const auto folds = [](const Vector3d& at) { return sideways({0.15 * std::sin(50 * at.x()), 0}); };
     const LightBench bench = make_bench(folds, plate_at(2.2, 4, 256), surfaces, 65);
     FlowSettings settings = single(0.1);
     settings.finest = finest;
@@ -275,7 +258,7 @@ TEST(FlowMap, CanBeCancelled) {
 // Flow maps whose vertices were traced in earlier runs or by shards, and whose map and light ranks make together: the
 // same bits, and hardly a ray more.
 /// Without symmetry, so that sums differ with their order.
-Eigen::Matrix3d skew_lens(const Eigen::Vector3d& at) {
+Matrix3d skew_lens(const Vector3d& at) {
   return lens({1.1 * at.x() + 0.13 * at.y() + 0.07, 0.9 * at.y() - 0.21 * at.x() - 0.05, at.z()});
 }
 
