@@ -7,9 +7,9 @@
 namespace tensorray {
 namespace {
 
-AutoScale scale_of(const TensorField& field, const Vector3d& direction = {0, 0, -1}) {
+AutoScale scale_of(const TensorField& field, const Progress& progress = Progress()) {
   return choose_scale(field, Geometry(surfaces_of(field)),
-                      silhouette_beam(field.corners(), direction, Vector3d::UnitY()), Progress());
+                      silhouette_beam(field.corners(), -Vector3d::UnitZ(), Vector3d::UnitY()), progress);
 }
 
 /// Of the field and of length. Squares of these lengths, or of their inverses, are beyond single precision.
@@ -17,7 +17,7 @@ TEST(AutoScale, CancelsTheUnits) {
   const Interpolant interpolants[] = {{}, {Interpolation::cubic, Border::fade}};
   for (const Interpolant& interpolant : interpolants) {
     const auto scale_with = [&](double size, double strength) {
-      const Eigen::Affine3d placement(Eigen::Scaling(size));
+      const Affine3d placement(Eigen::Scaling(size));
       const auto tensor = [&](const Vector3d& p) { return Matrix3d(strength * linear_tensor(p / size)); };
       return scale_of(TensorField(cube_grid({9, 9, 9}, tensor, placement), interpolant));
     };
@@ -94,8 +94,8 @@ TEST(AutoDirection, IsTheOneThatShowsMost) {
 /// A plate in plane stress: light along its normal, which is a principal direction, goes straight, and light along its
 /// edges makes a strip.
 TEST(AutoDirection, OfAPlateIsADiagonalThatFillsThePicture) {
-  const TensorGrid grid = dense_grid(Eigen::AlignedBox3i(Eigen::Vector3i::Zero(), Eigen::Vector3i(40, 20, 2)),
-                                     Eigen::Affine3d(Eigen::Scaling(0.1)), [](const Eigen::Vector3i& at) -> Matrix3d {
+  const TensorGrid grid = dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(40, 20, 2)), Affine3d(Eigen::Scaling(0.1)),
+                                     [](const Vector3i& at) -> Matrix3d {
                                        return std::sin(0.3 * at.x()) * Vector3d(1, 0.2, 0).asDiagonal().toDenseMatrix();
                                      });
   const TensorField field(grid, {Interpolation::cubic, Border::extend});
@@ -135,11 +135,9 @@ TEST(AutoScale, FieldsThatTurnNoLightKeepTheirScale) {
 }
 
 TEST(AutoScale, StopsWhenCancelled) {
-  const TensorField field = cube_field(9, linear_tensor);
   Progress progress;
   progress.cancelled = true;
-  const Beam beam = silhouette_beam(field.corners(), {0, 0, -1}, Vector3d::UnitY());
-  EXPECT_THROW(choose_scale(field, Geometry(surfaces_of(field)), beam, progress), Cancelled);
+  EXPECT_THROW(scale_of(cube_field(9, linear_tensor), progress), Cancelled);
 }
 
 }  // namespace

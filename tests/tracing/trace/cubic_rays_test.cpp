@@ -65,7 +65,7 @@ std::vector<Ray> true_rays(const TensorFunction& T) {
 }
 
 TensorField field_of(const TensorFunction& T, int voxels, const Interpolant& interpolant) {
-  return TensorField(cube_grid(Eigen::Vector3i::Constant(voxels), T), interpolant);
+  return TensorField(cube_grid(Vector3i::Constant(voxels), T), interpolant);
 }
 
 /// Halving the step divides the error by 2⁴ where the field is one polynomial.

@@ -2,9 +2,9 @@
 // sampled from, and packets against the reference.
 
 #include <limits>
-#include <map>
 
 #include "tests/tracing/packet_support.h"
+#include "tests/volumes/level_support.h"
 #include "tracing/paths/paths.h"
 #include "tracing/trace/trace.h"
 #include "volumes/sampling/tensor_sampler.h"
@@ -16,27 +16,10 @@ namespace {
 using Place = std::function<bool(const Vector3d&)>;
 
 /// Adds a level to a grid, in the chosen bricks of the level before.
-/// @param tensor  Of a position in voxels of level 0.
-void refine(TensorGrid& grid, const Place& is_refined, const TensorFunction& tensor) {
-  const TensorBlocks& before = grid.finer.empty() ? grid.blocks : grid.finer.back();
-  const double voxel = std::ldexp(1, -static_cast<int>(grid.finer.size()) - 1);
-  const Vector3i last = grid.active_box().max();
-  std::map<std::array<int, 3>, TensorBlock> blocks;  // In the order of their origins.
-  for (const TensorBlock& parent : before) {
-    const Vector3d middle = 2 * voxel * (parent.origin.cast<double>() + Vector3d::Constant(4));
-    const Vector3d first = 2 * voxel * parent.origin.cast<double>();
-    if (!is_refined(middle) || (first.array() >= last.cast<double>().array().max(1)).any()) continue;
-    for (int child = 0; child < 8; ++child) {
-      TensorBlock block;
-      block.origin = 2 * parent.origin + 8 * Vector3i(child & 1, child >> 1 & 1, child >> 2);
-      block.active.set();
-      for (int i = 0; i < TensorBlock::voxels; ++i)
-        block.values[i] = tensor(voxel * (block.origin + TensorBlock::position(i)).cast<double>()).cast<float>();
-      blocks.emplace(std::array<int, 3>{block.origin.x(), block.origin.y(), block.origin.z()}, block);
-    }
-  }
-  TensorBlocks& level = grid.finer.emplace_back();
-  for (const auto& [origin, block] : blocks) level.push_back(block);
+void refine(TensorGrid& grid, const Place& is_refined, const Formula& tensor) {
+  const double brick = std::ldexp(8, -static_cast<int>(grid.finer.size()));
+  const auto refines = [&](const Vector3i& at) { return is_refined(brick * (at.cast<double>().array() + 0.5)); };
+  add_level(grid, grid.active_box(), refines, tensor);
 }
 
 /// The box without an octant: an L in each section.
@@ -132,23 +115,16 @@ TEST_P(RaysThroughLevels, SurfacesAndCutsWithinFineBricks) {
 /// Alone, in a batch, and in any order: what becomes of a ray does not depend on the others, nor on threads.
 TEST_P(RaysThroughLevels, ARayDoesNotDependOnTheOthers) {
   TensorField field = waves_field(lattices()[2]);
-  const RayBatch rays = rays_of_all_kinds(field, {0.02, 0.05});
+  RayBatch rays = rays_of_all_kinds(field, {0.02, 0.05});
+  rays.wants_log_radiance_scale = true;
   const Scene scene = make_scene("alone", std::move(field), {}, 0, rays);
   const RayBatch together = traced(scene, rays);
-  for (std::size_t i = 0; i < rays.size(); i += 5) {
-    RayBatch one;
-    one.add(rays.position[i], rays.direction[i], rays.flexibility[i]);
-    one = traced(scene, one);
-    EXPECT_TRUE(identical(one, 0, together, i)) << i;
-  }
+  for (std::size_t i = 0; i < rays.size(); i += 5) expect_identical(scene, together, {i});
 }
 
 TEST_P(RaysThroughLevels, DifferentialsAreThoseOfTheReference) {
   TensorField field = waves_field(lattices()[2]);
-  RayBatch rays = random_rays(field, 60, {0.03}, 52);
-  RayDifferential start;
-  start.position << Vector3d::UnitX(), Vector3d::UnitY();
-  rays.differentials.assign(rays.size(), start);
+  const RayBatch rays = with_differentials(random_rays(field, 60, {0.03}, 52));
   const Scene scene = make_scene("differentials", std::move(field), {}, 0.5, rays);
   const RayBatch fast = traced(scene, rays), exact = traced_by_reference(scene, rays);
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -192,16 +168,13 @@ struct Redundant {
 TEST(LevelsThatAddNothing, RaysAndDifferentialsAreThoseOfLevelZero) {
   const Redundant fields;
   ASSERT_EQ(fields.refined.levels(), 3);
-  RayBatch rays = random_rays(fields.alone, 60, wavelengths(0.02), 53);
-  RayDifferential start;
-  start.position << Vector3d::UnitX(), Vector3d::UnitY();
+  const RayBatch plain = random_rays(fields.alone, 60, wavelengths(0.02), 53);
   const std::pair<BendingMethod, double> ways[] = {{BendingMethod::splitting4, 0.25},
                                                    {BendingMethod::rk4, 0.125},
                                                    {BendingMethod::dopri5, 0},
                                                    {BendingMethod::splitting4, 0}};
-  for (const bool with_differentials : {false, true})
+  for (const RayBatch& rays : {plain, with_differentials(plain)})
     for (const auto& [method, step] : ways) {
-      if (with_differentials) rays.differentials.assign(rays.size(), start);
       Scene scene = make_scene("alone", fields.alone, {}, step, rays);
       scene.settings.method = method;
       scene.settings.tolerance = 1e-8;
@@ -212,7 +185,7 @@ TEST(LevelsThatAddNothing, RaysAndDifferentialsAreThoseOfLevelZero) {
       for (std::size_t i = 0; i < rays.size(); ++i) {
         ASSERT_EQ(exact.end[i], expected.end[i]);
         EXPECT_LT(distance_in_voxels(exact.position[i], expected.position[i]), 1e-6) << i << ", " << step;
-        if (!with_differentials) continue;
+        if (rays.differentials.empty()) continue;
         const double apart = (exact.differentials[i].position - expected.differentials[i].position).norm();
         EXPECT_LT(apart, 1e-5 * expected.differentials[i].position.norm()) << i;
       }
