@@ -276,22 +276,24 @@ inline void expect_reference(const Scene& scene, double sensitive = 0) {
   EXPECT_TRUE(adaptive || static_cast<double>(steps_apart) <= 0.02 * count + 1) << "rounding at faces is rare";
 }
 
+/// Distances between the ends of rays, in voxels, sorted.
+inline std::vector<double> distances(const RayBatch& a, const RayBatch& b) {
+  std::vector<double> result;
+  for (std::size_t i = 0; i < a.size(); ++i) result.push_back(distance_in_voxels(a.position[i], b.position[i]));
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
 /// Where errors decide about automatic steps, they depend on rounding. The errors of packets are then as large as those
 /// of the reference, but not equal to them. Both are compared with the reference at a hundredth of the tolerance.
 inline void expect_as_exact_as_reference(const Scene& scene) {
   SCOPED_TRACE(scene.name);
-  const RayBatch fast = traced(scene, scene.rays), reference = traced_by_reference(scene, scene.rays);
   BendingSettings settings = scene.settings;
   settings.tolerance /= 100;
   RayBatch truth = scene.rays;
   trace_reference(scene.field, scene.geometry, settings, truth);
-  std::vector<double> errors, usual_errors;
-  for (std::size_t i = 0; i < truth.size(); ++i) {
-    errors.push_back(distance_in_voxels(fast.position[i], truth.position[i]));
-    usual_errors.push_back(distance_in_voxels(reference.position[i], truth.position[i]));
-  }
-  std::sort(errors.begin(), errors.end());
-  std::sort(usual_errors.begin(), usual_errors.end());
+  const std::vector<double> errors = distances(traced(scene, scene.rays), truth);
+  const std::vector<double> usual_errors = distances(traced_by_reference(scene, scene.rays), truth);
   for (const double part : {0.5, 0.75, 0.9}) {
     const auto i = static_cast<std::size_t>(part * static_cast<double>(errors.size()));
     EXPECT_LE(errors[i], 2 * usual_errors[i] + position_tolerance) << part;

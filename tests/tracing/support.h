@@ -26,10 +26,8 @@ using TensorFunction = std::function<Matrix3d(const Vector3d&)>;
 /// positions.
 inline TensorGrid cube_grid(const Vector3i& voxels, const TensorFunction& tensor,
                             const Affine3d& placement = Affine3d::Identity()) {
-  Affine3d to_cube = Affine3d::Identity();
-  to_cube.translation().setConstant(-1);
-  to_cube.linear() = (2.0 / (voxels.array() - 1).cast<double>()).matrix().asDiagonal();
-  const Affine3d to_world = placement * to_cube;
+  const Vector3d edges = 2 / (voxels.array() - 1).cast<double>();
+  const Affine3d to_world = placement * Eigen::Translation3d(-1, -1, -1) * Eigen::Scaling(edges);
   return dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(voxels.array() - 1)), to_world,
                     [&](const Vector3i& index) { return tensor(to_world * index.cast<double>()); });
 }
@@ -100,6 +98,7 @@ struct Ray {
   Vector3d position, direction;
   RayEnd end = RayEnd::missed;
   std::uint32_t steps = 0;
+  double length = 0;
 };
 
 /// Traces with the reference: these tests check its mathematics in double precision, and packet_kernel_test.cpp
@@ -109,7 +108,11 @@ inline Ray trace_one(const TensorField& field, const Geometry& geometry, const B
   RayBatch batch;
   batch.add(position, direction.normalized(), flexibility);
   trace_reference(field, geometry, settings, batch);
-  return {batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]};
+  Ray ray{batch.position[0], batch.direction[0]};
+  ray.end = batch.end[0];
+  ray.steps = batch.steps[0];
+  ray.length = batch.length[0];
+  return ray;
 }
 
 /// One step of the classical Runge–Kutta method for P' = V, V' = s (T V − (VᵀTV) V).

@@ -35,6 +35,7 @@ TEST(Bending, ZeroAndIsotropicFieldsLeaveLightStraight) {
       EXPECT_EQ(ray.end, RayEnd::plate);
       EXPECT_LT((ray.position - (Vector3d(0.3, 0.1, 3) + 5 / -V.z() * V)).norm(), 1e-12);
       EXPECT_LT((ray.direction - V).norm(), 1e-14);
+      EXPECT_NEAR(ray.length, 5 / -V.z(), 1e-12);
     }
   }
 }
@@ -119,12 +120,12 @@ TEST(Bending, EntryExitAndPlateKeepTheOrder) {
   const TensorField field = cube_field(9, linear_tensor);
   for (const double plate_at : {1.5, 0.37}) {  // Behind the volume, and inside.
     const Geometry geometry = geometry_with(field, plate_across(Vector3d(0.1, 0.2, -1), plate_at));
-    const auto land = [&](BendingMethod method, double step) {
+    const auto land = [&](BendingMethod method, double step) -> Eigen::Vector4d {  // Where, and after which length.
       const Ray ray = trace_one(field, geometry, settings_of(method, step), {0.2, -0.1, 2}, {0, 0, -1}, 0.5);
       EXPECT_EQ(ray.end, RayEnd::plate);
-      return ray.position;
+      return {ray.position.x(), ray.position.y(), ray.position.z(), ray.length};
     };
-    const Vector3d exact = land(BendingMethod::rk4, 1.0 / 256);
+    const Eigen::Vector4d exact = land(BendingMethod::rk4, 1.0 / 256);
     const auto order = [&](BendingMethod method, double step) {
       return std::log2((land(method, step) - exact).norm() / (land(method, step / 8) - exact).norm()) / 3;
     };

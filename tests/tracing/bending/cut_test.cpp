@@ -16,10 +16,8 @@ using Parts = std::vector<TriangleMesh>;
 
 /// The same box with the other diagonal on each face, which mirroring makes.
 TriangleMesh mirrored_part(const Vector3d& low, const Vector3d& high) {
-  TriangleMesh box = box_between({-high.x(), low.y(), low.z()}, {-low.x(), high.y(), high.z()});
-  for (Vector3d& vertex : box.vertices) vertex.x() = -vertex.x();
-  for (auto& triangle : box.triangles) std::swap(triangle[0], triangle[1]);
-  return box;
+  const Affine3d mirror(Eigen::Scaling(-1.0, 1.0, 1.0));
+  return box_between({-high.x(), low.y(), low.z()}, {-low.x(), high.y(), high.z()}, mirror);
 }
 
 /// Rings of latitude about a centre; a pole is a corner of many triangles.

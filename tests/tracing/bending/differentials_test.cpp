@@ -6,12 +6,6 @@
 namespace tensorray {
 namespace {
 
-/// One ray with its derivatives along the two axes across its direction.
-struct Traced {
-  Ray ray;
-  RayDifferential differential;
-};
-
 /// The start of a ray as a function of two parameters: its position moves across, and its direction turns.
 struct Start {
   Vector3d position, direction, across[2];
@@ -30,8 +24,9 @@ Start make_start(const Vector3d& position, const Vector3d& direction, double tur
   return start;
 }
 
-Traced trace_with_differential(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                               const Start& start, double flexibility) {
+/// One ray with its derivatives along the two axes across its direction.
+RayBatch trace_with_differential(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                                 const Start& start, double flexibility) {
   RayBatch batch;
   batch.add(start.position, start.direction, flexibility);
   RayDifferential differential;
@@ -41,7 +36,7 @@ Traced trace_with_differential(const TensorField& field, const Geometry& geometr
   }
   batch.differentials.push_back(differential);
   trace_reference(field, geometry, settings, batch);
-  return {{batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]}, batch.differentials[0]};
+  return batch;
 }
 
 /// Central differences of the rays' ends.
@@ -88,11 +83,11 @@ class RayDifferentials : public ::testing::TestWithParam<BendingMethod> {
   double tolerance() const { return GetParam() == BendingMethod::euler ? 1e-2 : 2e-3; }
 
   void expect_finite_differences(const Geometry& geometry, const Start& start, double flexibility) {
-    const Traced traced = trace_with_differential(field_, geometry, settings(), start, flexibility);
-    ASSERT_EQ(traced.ray.end, RayEnd::plate);
+    const RayBatch traced = trace_with_differential(field_, geometry, settings(), start, flexibility);
+    ASSERT_EQ(traced.end[0], RayEnd::plate);
     const Ray alone = trace_one(field_, geometry, settings(), start.position, start.direction, flexibility);
-    EXPECT_LT((traced.ray.position - alone.position).norm(), 1e-9) << "differentials must not change the ray";
-    expect_equal(traced.differential, finite_differences(field_, geometry, settings(), start, flexibility, 1e-4),
+    EXPECT_LT((traced.position[0] - alone.position).norm(), 1e-9) << "differentials must not change the ray";
+    expect_equal(traced.differentials[0], finite_differences(field_, geometry, settings(), start, flexibility, 1e-4),
                  tolerance());
   }
 };
@@ -119,21 +114,21 @@ TEST(RayDifferential, ParallelLightAlongAnEigenvectorStaysParallel) {
   const TensorField field = constant_field(Vector3d(0.75, -0.5, 0).asDiagonal());
   const Geometry geometry = geometry_with(field, plate_across(-Vector3d::UnitZ(), 2));
   const BendingSettings settings;
-  const Traced parallel =
+  const RayBatch parallel =
       trace_with_differential(field, geometry, settings, make_start({0, 0, 2}, -Vector3d::UnitZ(), 0), 1);
-  EXPECT_NEAR(parallel.differential.position.col(0).norm(), 1, 1e-9);
-  EXPECT_NEAR(parallel.differential.direction.norm(), 0, 1e-9);
+  EXPECT_NEAR(parallel.differentials[0].position.col(0).norm(), 1, 1e-9);
+  EXPECT_NEAR(parallel.differentials[0].direction.norm(), 0, 1e-9);
 
   // Within the volume, of depth 2, a turn grows along x by exp(0.75 · 2), and moves the ray sideways by the turn times
   // ∫ exp(0.75 t) dt. The light is straight for one unit before the volume and for one unit behind it.
   const double turn = 0.1;
-  const Traced turned =
+  const RayBatch turned =
       trace_with_differential(field, geometry, settings, make_start({0, 0, 2}, -Vector3d::UnitZ(), turn), 1);
   const double expected = 1 + turn * (1 + (std::exp(1.5) - 1) / 0.75 + std::exp(1.5));
   // The error of the drift, with a step of ½ voxel (1/8), is of second order: h²/24 times the integral of the second
   // derivative.
-  EXPECT_NEAR(turned.differential.position.col(0).norm(), expected, turn * 1e-2);
-  EXPECT_NEAR(turned.differential.direction.col(0).norm(), turn * std::exp(1.5), 1e-9);
+  EXPECT_NEAR(turned.differentials[0].position.col(0).norm(), expected, turn * 1e-2);
+  EXPECT_NEAR(turned.differentials[0].direction.col(0).norm(), turn * std::exp(1.5), 1e-9);
 }
 
 /// Strong kicks use another branch of the exponential.
@@ -143,31 +138,10 @@ TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
   BendingSettings settings = settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ is about 8.
   settings.max_steps = 1;
   const Start start = make_start({0.1, -0.2, 0.3}, {0, 0, -1}, 0);
-  const Traced traced = trace_with_differential(field, geometry, settings, start, 8);
+  const RayBatch traced = trace_with_differential(field, geometry, settings, start, 8);
   // Both take the same steps, so that only the error of the finite differences remains.
-  expect_equal(traced.differential, finite_differences(field, geometry, settings, start, 8, 1e-5, RayEnd::step_limit),
-               1e-6);
-}
-
-TEST(RayDifferential, LengthIsThatOfTheWay) {
-  const TensorField field = constant_field(Matrix3d::Zero());
-  const Vector3d direction = Vector3d(0.3, 0.1, -1).normalized();
-  RayBatch batch;
-  batch.add(-2 * direction, direction, 1);
-  trace_reference(field, geometry_with(field, plate_across(direction, 3)), {}, batch);
-  EXPECT_NEAR(batch.length[0], 5, 1e-9);
-
-  // A circle: an antisymmetric tensor turns light at a constant rate, and the length is the angle divided by this rate.
-  Matrix3d turning = Matrix3d::Zero();
-  turning(0, 2) = 0.5;
-  turning(2, 0) = -0.5;
-  const TensorField circle = constant_field(turning);
-  RayBatch arc;
-  arc.add({0, 0, 0.9}, {0, 0, -1}, 1);
-  trace_reference(circle, Geometry(surfaces_of(circle)), settings_of(BendingMethod::splitting, 1.0 / 16), arc);
-  ASSERT_EQ(arc.end[0], RayEnd::missed);
-  const double angle = std::acos(-arc.direction[0].z());
-  EXPECT_NEAR(arc.length[0], angle / 0.5, 1e-4);
+  expect_equal(traced.differentials[0],
+               finite_differences(field, geometry, settings, start, 8, 1e-5, RayEnd::step_limit), 1e-6);
 }
 
 }  // namespace

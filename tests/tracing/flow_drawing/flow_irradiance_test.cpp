@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <numeric>
-#include <optional>
 
 #include "renderer/light_maps/photon_map.h"
 #include "renderer/lights/lights.h"
@@ -23,12 +22,8 @@ LandingLight sun(const Vector3d& direction) {
 }
 
 TensorField bending_field() {
-  return cube_field(17, [](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T(0, 0) = p.x();
-    T(1, 0) = 0.5;
-    return T;
-  });
+  return cube_field(
+      17, [](const Vector3d& p) { return Matrix3d(Vector3d(p.x(), 0.5, 0) * Vector3d::UnitX().transpose()); });
 }
 
 /// Irradiance times area, over the whole plate.

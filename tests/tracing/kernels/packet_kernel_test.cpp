@@ -3,8 +3,6 @@
 
 #include "tracing/kernels/packet_kernel.h"
 
-#include <cstring>
-#include <limits>
 #include <numeric>
 
 #include "tests/tracing/packet_support.h"
@@ -146,7 +144,7 @@ TEST_P(PacketKernel, EndsAtTheGreatestLengthAndNumberOfSteps) {
     Scene scene = random_scene(lattice, 0, 0.05, 40);
     scene.settings.max_length = 1.013;
     expect_reference(scene, 0.1);
-    scene.settings.max_length = std::numeric_limits<double>::infinity();
+    scene.settings.max_length = INFINITY;
     scene.settings.max_steps = 7;
     scene.settings.step = 1;
     expect_reference(scene, 0.1);
@@ -161,12 +159,11 @@ TEST_P(PacketKernel, EndsAtTheGreatestLengthAndNumberOfSteps) {
 
 TEST_P(PacketKernel, EndsAsTheReferenceDoesInOddFields) {
   const TensorFunction smooth = smooth_tensor(53);
-  const double infinite = std::numeric_limits<double>::infinity();
   for (const double factor : {1e-41, 1.0, 1e15, std::nan("")}) {
     TensorField field = lattice_field(index_box({-3, 0, 2}, {20, 17, 19}), lattices()[0], [&](const Vector3d& p) {
       return Matrix3d(p.x() < 5 ? Matrix3d(-30 * factor * Matrix3d::Identity()) : Matrix3d(factor * smooth(p)));
     });
-    RayBatch rays = random_rays(field, 24, {0.1, -0.1, 0, 1e30, 1e300, infinite, std::nan("")}, 54);
+    RayBatch rays = random_rays(field, 24, {0.1, -0.1, 0, 1e30, 1e300, INFINITY, NAN}, 54);
     Scene scene = make_scene("factor " + std::to_string(factor), std::move(field), {}, 0, std::move(rays));
     scene.settings.max_steps = 300;
     SCOPED_TRACE(scene.name);

@@ -35,11 +35,8 @@ TEST(AutoScale, CancelsTheUnits) {
 /// A lens with x'' = −ω²x along the light, ω² = 0.2 · scale. Light converges to |cos 2ω − ω/2 sin 2ω| of its width on
 /// the plane, at a distance of half a unit behind a depth of 2.
 TEST(AutoScale, AgreesWithTheClosedFormOfALens) {
-  const AutoScale chosen = scale_of(cube_field(17, [](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T.col(2) = Vector3d(p.x(), p.y(), 0);
-    return T;
-  }));
+  const AutoScale chosen = scale_of(cube_field(
+      17, [](const Vector3d& p) -> Matrix3d { return Vector3d(p.x(), p.y(), 0) * Vector3d::UnitZ().transpose(); }));
   const double omega = std::sqrt(0.2 * chosen.scale);
   const double change = -2 * std::log(std::cos(2 * omega) - omega / 2 * std::sin(2 * omega));
   const double shown = change * std::exp(1 - change);
@@ -55,8 +52,7 @@ TEST(AutoScale, SmallStructuresAreSeen) {
   const auto waves = [](double half_width) {
     return scale_of(cube_field(65, [&](const Vector3d& p) {
       Matrix3d T = Matrix3d::Zero();
-      if (std::abs(p.x()) < half_width && std::abs(p.y()) < half_width)
-        T.col(2) = Vector3d(std::sin(20 * p.x()), std::sin(20 * p.y()), 0);
+      if (p.head<2>().cwiseAbs().maxCoeff() < half_width) T.col(2).head<2>() = (20 * p.head<2>()).array().sin();
       return T;
     }));
   };

@@ -1,8 +1,6 @@
 // Rays through fields of several levels: against level 0 alone, against rays through the formula that the voxels were
 // sampled from, and packets against the reference.
 
-#include <limits>
-
 #include "tests/tracing/packet_support.h"
 #include "tests/volumes/level_support.h"
 #include "tracing/paths/paths.h"
@@ -136,7 +134,7 @@ TEST_P(RaysThroughLevels, DifferentialsAreThoseOfTheReference) {
 
 /// Light reaches no end in fields that cannot be followed, but it stops.
 TEST_P(RaysThroughLevels, NothingHangs) {
-  for (const double value : {std::nan(""), std::numeric_limits<double>::infinity(), 1e30}) {
+  for (const double value : {double{NAN}, double{INFINITY}, 1e30}) {
     TensorGrid grid = usual_grid();
     grid.finer[0][20].values[100](1, 2) = static_cast<float>(value);
     TensorField field = cubic_field(grid);
@@ -201,11 +199,7 @@ TEST(LevelsThatAddNothing, PacketsAreThoseOfLevelZeroUpToRounding) {
     scene.settings.tolerance = tolerance;
     const RayBatch expected = traced(scene, rays);
     scene.field = fields.refined;
-    const RayBatch packets = traced(scene, rays);
-    std::vector<double> apart;
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      apart.push_back(distance_in_voxels(packets.position[i], expected.position[i]));
-    std::sort(apart.begin(), apart.end());
+    const std::vector<double> apart = distances(traced(scene, rays), expected);
     EXPECT_LT(apart[apart.size() / 2], 5e-6 + 0.01 * tolerance);
     EXPECT_LT(apart[apart.size() * 9 / 10], 5e-5 + 0.1 * tolerance);
   }
