@@ -127,7 +127,10 @@ inline Caustic caustic_of(const LightBench& bench, const FlowMap& map,
   return draw_caustic(map, bench.plate(), bands, {}, Progress());
 }
 
-inline double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+template <class Values>
+double sum(const Values& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
 
 /// The L2 distance from `exact`, as a part of its norm.
 inline double relative_distance(const std::vector<double>& values, const std::vector<double>& exact) {
@@ -138,8 +141,6 @@ inline double relative_distance(const std::vector<double>& values, const std::ve
 
 inline double power_of(const Caustic& caustic, RayEnd end) { return caustic.power[0][static_cast<int>(end)]; }
 
-inline double all_power(const Caustic& caustic) {
-  return std::accumulate(caustic.power[0].begin(), caustic.power[0].end(), 0.0);
-}
+inline double all_power(const Caustic& caustic) { return sum(caustic.power[0]); }
 
 }  // namespace tensorray::test

@@ -316,21 +316,17 @@ inline bool identical(const RayBatch& a, std::size_t i, const RayBatch& b, std::
   return std::memcmp(one.data(), other.data(), one.size() * sizeof(Vector3d)) == 0;
 }
 
-/// Some rays of a batch, before they are traced.
-inline RayBatch chosen(const RayBatch& rays, const std::vector<std::size_t>& order) {
-  RayBatch result;
-  result.wants_log_radiance_scale = rays.wants_log_radiance_scale;
-  for (const std::size_t i : order) result.add(rays.position[i], rays.direction[i], rays.flexibility[i]);
-  return result;
-}
-
 /// Traces some rays of a scene, in any order: they are those of the whole batch, to the last bit.
 inline void expect_identical(const Scene& scene, const RayBatch& all, const std::vector<std::size_t>& order) {
-  const RayBatch some = traced(scene, chosen(scene.rays, order));
+  const RayBatch& rays = scene.rays;
+  RayBatch some;
+  some.wants_log_radiance_scale = rays.wants_log_radiance_scale;
+  for (const std::size_t i : order) some.add(rays.position[i], rays.direction[i], rays.flexibility[i]);
+  some = traced(scene, some);
   std::size_t differ = 0;
   for (std::size_t i = 0; i < order.size(); ++i) {
     if (identical(some, i, all, order[i]) || ++differ > 3) continue;
-    ADD_FAILURE() << "ray " << order[i] << ", s " << scene.rays.flexibility[order[i]]
+    ADD_FAILURE() << "ray " << order[i] << ", s " << rays.flexibility[order[i]]
                   << ":\n  here: " << description(scene.field, some, i)
                   << "\n  in the batch: " << description(scene.field, all, order[i]);
   }
@@ -348,6 +344,28 @@ inline RayBatch with_differentials(RayBatch rays) {
     rays.differentials.push_back(differential);
   }
   return rays;
+}
+
+/// Compares the differentials of packets with those of the reference.
+inline void expect_differentials(const Scene& scene, double tolerance) {
+  SCOPED_TRACE(scene.name);
+  const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
+  RayBatch turned = turned_a_little(scene);
+  turned.differentials = scene.rays.differentials;
+  const RayBatch moved = traced_by_reference(scene, turned);
+  std::size_t compared = 0;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    const auto apart = [&](const RayBatch& a) {
+      const RayDifferential &of = a.differentials[i], &right = exact.differentials[i];
+      return std::max((of.position - right.position).norm() / right.position.norm(),
+                      (of.direction - right.direction).norm() / (right.direction.norm() + right.position.norm()));
+    };
+    if (moved.end[i] != exact.end[i] || apart(moved) > 1e-4) continue;  // The light grazes a surface.
+    ++compared;
+    EXPECT_EQ(fast.end[i], exact.end[i]);
+    EXPECT_LT(apart(fast), tolerance) << "ray " << i << " after " << exact.steps[i] << " steps";
+  }
+  EXPECT_GT(compared, exact.size() * 8 / 10);
 }
 
 /// Tests that run with each of the kernel's instruction sets.

@@ -47,10 +47,8 @@ inline void expect_same(const std::vector<Path>& a, const std::vector<Path>& b) 
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     expect_same(a[i].points, b[i].points);
-    EXPECT_EQ(a[i].flexibility, b[i].flexibility);
-    EXPECT_EQ(a[i].wavelength, b[i].wavelength);
-    EXPECT_EQ(a[i].end, b[i].end);
-    EXPECT_EQ(a[i].backward_end, b[i].backward_end);
+    const Path& path = b[i];
+    EXPECT_THAT(a[i], testing::FieldsAre(testing::_, path.flexibility, path.wavelength, path.end, path.backward_end));
   }
 }
 

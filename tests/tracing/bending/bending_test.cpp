@@ -15,8 +15,8 @@
 namespace tensorray {
 namespace {
 
-constexpr BendingMethod all_methods[] = {BendingMethod::euler, BendingMethod::splitting, BendingMethod::rk4,
-                                         BendingMethod::bs23, BendingMethod::dopri5};
+constexpr BendingMethod all_methods[] = {BendingMethod::euler, BendingMethod::splitting, BendingMethod::splitting4,
+                                         BendingMethod::rk4,   BendingMethod::bs23,      BendingMethod::dopri5};
 
 /// Diagonal, symmetric, general, a turn, and a shear.
 std::vector<Matrix3d> constant_tensors() {
@@ -26,8 +26,10 @@ std::vector<Matrix3d> constant_tensors() {
 }
 
 TEST(Bending, ZeroAndIsotropicFieldsLeaveLightStraight) {
-  for (const double c : {0.0, 3.0}) {
-    const TensorField field = constant_field(c * Matrix3d::Identity());
+  for (const auto& [c, between] :
+       {std::pair(0.0, Interpolation::linear), {3.0, Interpolation::linear}, {7.0, Interpolation::cubic}}) {
+    const auto tensor = [c = c](const Vector3d&) { return Matrix3d(c * Matrix3d::Identity()); };
+    const TensorField field(cube_grid({9, 9, 9}, tensor), {between, Border::fade});
     const Geometry geometry = geometry_with(field, plate_across({0, 0, -1}, 2));
     for (const BendingMethod method : all_methods) {
       const Vector3d V = Vector3d(0.1, -0.2, -1).normalized();
@@ -188,13 +190,11 @@ TEST(Bending, EveryEndIsToldApart) {
   EXPECT_EQ(end({0, 0, 2}, 0, few), RayEnd::step_limit);
   EXPECT_EQ(end({0, 0, 2}, std::nan("")), RayEnd::degenerate);
   EXPECT_EQ(end({0, 0, 2}, 1e308), RayEnd::degenerate);
-}
-
-TEST(Bending, EulerEndsWhereTheFieldAnnihilatesTheDirection) {
-  const TensorField field = constant_field(-Matrix3d::Identity());
-  const BendingSettings settings = settings_of(BendingMethod::euler, 0.5);
-  const double s = 1 / (0.5 * voxel_size(field));  // V + s h T V = 0.
-  EXPECT_EQ(trace_one(field, Geometry(surfaces_of(field)), settings, {0, 0, 2}, {0, 0, -1}, s).end, RayEnd::degenerate);
+  // Euler's method, where the field annihilates the direction: V + s h T V = 0.
+  const TensorField inwards = constant_field(-Matrix3d::Identity());
+  const BendingSettings euler = settings_of(BendingMethod::euler, 0.5);
+  EXPECT_EQ(trace_one(inwards, geometry, euler, {0, 0, 2}, {0, 0, -1}, 1 / (0.5 * voxel_size(inwards))).end,
+            RayEnd::degenerate);
 }
 
 TEST(Bending, ACutActsAsASmallerVolume) {

@@ -145,8 +145,6 @@ std::pair<Vector3d, Vector3d> a_line(LineKind kind, std::mt19937& random) {
 
 class CutTest : public testing::TestWithParam<CutCase> {
  protected:
-  static constexpr int per_kind = 1000;
-
   static const TensorField& field() {
     static const TensorField result(cube_grid(Vector3i::Constant(17), [](const Vector3d&) { return general_tensor(); }),
                                     {Interpolation::cubic, Border::extend});
@@ -169,7 +167,7 @@ class CutTest : public testing::TestWithParam<CutCase> {
   static RayBatch lines(LineKind kind, double flexibility) {
     RayBatch batch;
     std::mt19937 random(7);
-    for (int i = 0; i < per_kind; ++i) {
+    for (int i = 0; i < 1000; ++i) {
       const auto [from, along] = a_line(kind, random);
       batch.add(from, along, flexibility);
     }

@@ -44,8 +44,7 @@ TEST(Geometry, BoxAgreesWithTheAnalyticOne) {
 }
 
 TEST(Geometry, IsPreciseFarFromTheOriginAndInAnyUnit) {
-  const Affine3d far(Eigen::Translation3d(1e6, -1e6, 1e6));
-  std::vector<std::tuple<Affine3d, double, double>> cases{{far, 1, 1e-8}};
+  std::vector<std::tuple<Affine3d, double, double>> cases{{Affine3d(Eigen::Translation3d(1e6, -1e6, 1e6)), 1, 1e-8}};
   for (const double unit : {1e-20, 1e-6, 1e12, 1e20}) cases.emplace_back(Affine3d(Eigen::Scaling(unit)), unit, 1e-12);
   for (const auto& [placement, unit, error] : cases) {
     const Geometry geometry(box_surfaces(placement));

@@ -5,6 +5,7 @@
 
 #include "renderer/light_maps/photon_map.h"
 #include "renderer/lights/lights.h"
+#include "tests/renderer/shapes.h"
 #include "tests/tracing/flow_support.h"
 
 namespace tensorray {
@@ -134,22 +135,19 @@ TEST(FlowIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
   for (const LandingLight& light : {sun({0.2, 0.1, -1}), lamp({0.5, 0.3, 4})}) {
     Plate behind = plane_behind(light.source ? Vector3d((plate.center - *light.source).normalized()) : light.direction);
     behind.size = {16, 16};
-    const auto body = flow_irradiance(field, surfaces, behind, light, {{}, 192, 40000}, {});
-    ASSERT_TRUE(body);
+    const FlowIrradiance body = flow_irradiance(field, surfaces, behind, light, {{}, 192, 40000}, {}).value();
     const auto map_of = [&](const FlowIrradiance& from, bool is_body) {
       IrradianceMap result;
       result.plate = from.plate;
       result.source = light.source;
       result.towards = -light.direction;
       result.bands = 1;
-      ShadedSurface shown;
-      shown.shape = *surfaces.body;
-      if (is_body) result.body = std::make_shared<SurfaceScene>(std::vector{shown});
+      if (is_body) result.body = std::make_shared<SurfaceScene>(std::vector{surface_of(*surfaces.body)});
       for (std::size_t i = 0; i < from.irradiance.plane_size(); ++i)
         result.irradiance.push_back(static_cast<float>(from.irradiance.plane(0)[i]));
       return result;
     };
-    const IrradianceMap on_body = map_of(*body, true), on_plate = map_of(land(field, light, plate), false);
+    const IrradianceMap on_body = map_of(body, true), on_plate = map_of(land(field, light, plate), false);
     for (const double x : {-0.5, 0.0, 0.4}) {
       Eigen::ArrayXd with_body = Eigen::ArrayXd::Zero(1), with_plate = with_body;
       for (int i = 0; i < 400; ++i) {

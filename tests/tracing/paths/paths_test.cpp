@@ -23,11 +23,7 @@ Path trace_one_path(const TensorField& field, const PathSeed& seed, const PathSe
 }
 
 PathSeed seed_at(const Vector3d& position, double flexibility = 0.5, const Vector3d& direction = {0, 0, -1}) {
-  PathSeed seed;
-  seed.position = position;
-  seed.direction = direction.normalized();
-  seed.flexibility = flexibility;
-  return seed;
+  return {position, direction.normalized(), flexibility};
 }
 
 /// The greatest distance of one of `points` from the polyline `other`.
@@ -258,21 +254,16 @@ TracedBothWays bent_ray(double flexibility) {
   return traced;
 }
 
-PathPoints all_points(const TracedBothWays& traced) {
-  PathPoints points;
-  for (const JoinedPoint& joined : traced.ray.points) {
-    points.push_back(joined.point);
-    for (std::size_t i = 0; i < joined.steps.count; ++i)
-      points.push_back(path_point(traced.field, traced.ray, joined.steps, i));
-  }
-  return points;
-}
-
 /// The error of each point between two that stay, in the tolerances' units, in double precision.
 TEST_P(PathThinning, KeepsItsTolerances) {
   for (const double flexibility : {0.05, 0.2, 0.8}) {
     const TracedBothWays traced = bent_ray(flexibility);
-    const PathPoints points = all_points(traced);
+    PathPoints points;
+    for (const JoinedPoint& joined : traced.ray.points) {
+      points.push_back(joined.point);
+      for (std::size_t i = 0; i < joined.steps.count; ++i)
+        points.push_back(path_point(traced.field, traced.ray, joined.steps, i));
+    }
     PathSamples samples;
     sample_path(traced.field, traced.ray, true, samples);
     const std::vector<std::size_t> chosen = thinned(samples, 0.05, 0.02);

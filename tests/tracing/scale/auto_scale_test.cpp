@@ -14,8 +14,7 @@ AutoScale scale_of(const TensorField& field, const Progress& progress = Progress
 
 /// Of the field and of length. Squares of these lengths, or of their inverses, are beyond single precision.
 TEST(AutoScale, CancelsTheUnits) {
-  const Interpolant interpolants[] = {{}, {Interpolation::cubic, Border::fade}};
-  for (const Interpolant& interpolant : interpolants) {
+  for (const Interpolant& interpolant : {Interpolant{}, Interpolant{Interpolation::cubic, Border::fade}}) {
     const auto scale_with = [&](double size, double strength) {
       const Affine3d placement(Eigen::Scaling(size));
       const auto tensor = [&](const Vector3d& p) { return Matrix3d(strength * linear_tensor(p / size)); };
@@ -73,10 +72,9 @@ TEST(AutoScale, LightThatOnlyTurnsTurnsVisibly) {
 
 TEST(AutoDirection, IsTheOneThatShowsMost) {
   for (int axis = 0; axis < 3; ++axis) {
-    const TensorField field = cube_field(9, [&](const Vector3d& p) {
-      Matrix3d T = Matrix3d::Zero();  // Bends light along one axis only.
-      T((axis + 1) % 3, axis) = std::sin(3 * p[(axis + 1) % 3]);
-      return T;
+    const int next = (axis + 1) % 3;
+    const TensorField field = cube_field(9, [&](const Vector3d& p) -> Matrix3d {  // Bends light along one axis only.
+      return std::sin(3 * p[next]) * Vector3d::Unit(next) * Vector3d::Unit(axis).transpose();
     });
     const AutoDirection chosen = choose_direction(field, Geometry(surfaces_of(field)), Vector3d::UnitZ(), Progress());
     EXPECT_GT(std::abs(chosen.direction[axis]), 0.5);  // Along it, or along a diagonal that has a part of it.
