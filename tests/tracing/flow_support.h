@@ -20,10 +20,10 @@ struct LightBench {
 };
 
 inline LightBench make_bench(TensorField field, const Plate& plate, Surfaces extra = {},
-                             const Eigen::Vector3d& direction = {0, 0, -1}) {
+                             const Vector3d& direction = {0, 0, -1}) {
   extra.bounds = surfaces_of(field).bounds;
   extra.plate = plate;
-  Beam beam = silhouette_beam(field.corners(), direction.normalized(), Eigen::Vector3d::UnitY());
+  Beam beam = silhouette_beam(field.corners(), direction.normalized(), Vector3d::UnitY());
   return {std::move(field), Geometry(std::move(extra)), std::move(beam)};
 }
 
@@ -49,15 +49,19 @@ inline std::vector<CausticBand> equal_bands(std::size_t count, double first, dou
   return bands;
 }
 
-inline Eigen::Matrix3d zero(const Eigen::Vector3d&) { return Eigen::Matrix3d::Zero(); }
+inline Matrix3d zero(const Vector3d&) { return Matrix3d::Zero(); }
+
+/// Turns light along z sideways.
+inline Matrix3d sideways(const Vector2d& turn) {
+  Matrix3d tensor = Matrix3d::Zero();
+  tensor.col(2).head<2>() = turn;
+  tensor.row(2).head<2>() = turn;
+  return tensor;
+}
 
 /// A field that focuses light of positive flexibility in the middle, and folds it further out.
-inline Eigen::Matrix3d lens(const Eigen::Vector3d& at) {
-  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();
-  const double strength = -2 * std::exp(-3 * at.head<2>().squaredNorm());
-  tensor(0, 2) = tensor(2, 0) = strength * at.x();
-  tensor(1, 2) = tensor(2, 1) = strength * at.y();
-  return tensor;
+inline Matrix3d lens(const Vector3d& at) {
+  return sideways(-2 * std::exp(-3 * at.head<2>().squaredNorm()) * at.head<2>());
 }
 
 /// A map that is given, over a lattice of `count` × `count` quads of the square from (low, low) to (high, high).
@@ -69,7 +73,7 @@ FlowMap lattice_map(int count, double low, double high, const Map& landing) {
   for (int y = 0; y <= count; ++y)
     for (int x = 0; x <= count; ++x) {
       map.starts.emplace_back(low + x * side, low + y * side);
-      map.landings.push_back(Eigen::Vector2d(landing(map.starts.back())).cast<float>());
+      map.landings.push_back(Vector2d(landing(map.starts.back())).cast<float>());
       map.lengths.push_back(static_cast<float>(map.starts.back().x()));
     }
   map.ends.assign(map.starts.size(), RayEnd::plate);
@@ -95,7 +99,7 @@ void spread(FlowMap& map, std::size_t samples, const Moves& moves) {
   std::vector<Eigen::Vector2f> landings;
   for (std::size_t i = 0; i < map.starts.size(); ++i)
     for (std::size_t sample = 0; sample < samples; ++sample)
-      landings.push_back(map.landings[i] + Eigen::Vector2d(moves(map.starts[i], sample)).cast<float>());
+      landings.push_back(map.landings[i] + Vector2d(moves(map.starts[i], sample)).cast<float>());
   map.landings = std::move(landings);
   map.wavelengths = samples;
   map.ends.assign(map.landings.size(), RayEnd::plate);
@@ -123,7 +127,10 @@ inline Caustic caustic_of(const LightBench& bench, const FlowMap& map,
   return draw_caustic(map, bench.plate(), bands, {}, Progress());
 }
 
-inline double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+template <class Values>
+double sum(const Values& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
 
 /// The L2 distance from `exact`, as a part of its norm.
 inline double relative_distance(const std::vector<double>& values, const std::vector<double>& exact) {
@@ -134,8 +141,6 @@ inline double relative_distance(const std::vector<double>& values, const std::ve
 
 inline double power_of(const Caustic& caustic, RayEnd end) { return caustic.power[0][static_cast<int>(end)]; }
 
-inline double all_power(const Caustic& caustic) {
-  return std::accumulate(caustic.power[0].begin(), caustic.power[0].end(), 0.0);
-}
+inline double all_power(const Caustic& caustic) { return sum(caustic.power[0]); }
 
 }  // namespace tensorray::test

@@ -24,23 +24,23 @@ class Numbers {
   double between(double low, double high) { return low + (high - low) * next(); }
   std::size_t below(std::size_t count) { return static_cast<std::size_t>(next() * static_cast<double>(count)); }
 
-  Eigen::Vector3d in(const Eigen::AlignedBox3d& box) {
+  Vector3d in(const AlignedBox3d& box) {
     const double z = next(), y = next(), x = next();
-    return box.min() + box.sizes().cwiseProduct(Eigen::Vector3d(x, y, z));
+    return box.min() + box.sizes().cwiseProduct(Vector3d(x, y, z));
   }
-  Eigen::Vector3d direction() {
+  Vector3d direction() {
     while (true) {
       const double z = between(-1, 1), y = between(-1, 1), x = between(-1, 1);
-      const Eigen::Vector3d v(x, y, z);
+      const Vector3d v(x, y, z);
       if (v.norm() < 1 && v.norm() > 0.1) return v.normalized();
     }
   }
-  Eigen::Vector2d two_between(double low, double high) {
+  Vector2d two_between(double low, double high) {
     const double y = between(low, high), x = between(low, high);
     return {x, y};
   }
-  Eigen::Matrix3d tensor() {
-    Eigen::Matrix3d T;
+  Matrix3d tensor() {
+    Matrix3d T;
     for (int i = 0; i < 9; ++i) T.data()[i] = between(-1, 1);
     return T;
   }
@@ -52,20 +52,20 @@ class Numbers {
 /// A sum of four waves of 24 to 64 units: smooth where the unit is a voxel. Its Frobenius norm is at most 1.
 inline TensorFunction smooth_tensor(unsigned seed) {
   struct Wave {
-    Eigen::Matrix3d amplitude;
-    Eigen::Vector3d k;
+    Matrix3d amplitude;
+    Vector3d k;
     double phase;
   };
   Numbers numbers(seed);
   std::vector<Wave> waves(4);
   for (Wave& wave : waves) {
     wave.amplitude = numbers.tensor().normalized() / static_cast<double>(waves.size());
-    const Eigen::Vector3d along = numbers.direction();
+    const Vector3d along = numbers.direction();
     wave.k = 2 * pi / numbers.between(24, 64) * along;
     wave.phase = numbers.between(0, 2 * pi);
   }
-  return [waves](const Eigen::Vector3d& p) {
-    Eigen::Matrix3d T = Eigen::Matrix3d::Zero();
+  return [waves](const Vector3d& p) {
+    Matrix3d T = Matrix3d::Zero();
     for (const Wave& wave : waves) T += std::sin(wave.k.dot(p) + wave.phase) * wave.amplitude;
     return T;
   };
@@ -74,28 +74,27 @@ inline TensorFunction smooth_tensor(unsigned seed) {
 /// Shapes of voxels; their mean edge is 0.05.
 struct Lattice {
   std::string name;
-  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
+  Affine3d to_world = Affine3d::Identity();
 };
 
 constexpr double mean_edge = 0.05;
 
 inline std::vector<Lattice> lattices() {
-  const Eigen::Matrix3d oblong = Eigen::Vector3d(0.5, 1, 2).asDiagonal();
-  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 3).normalized()).toRotationMatrix();
-  std::vector<Lattice> result{{"cubes"}, {"oblong"}, {"turned_oblong"}, {"mirrored_cubes"}, {"mirrored_turned"}};
-  result[1].to_world.linear() = oblong;
-  result[2].to_world.linear() = turn * oblong;
-  result[3].to_world.linear() = Eigen::Vector3d(-1, 1, 1).asDiagonal();
-  result[4].to_world.linear() = turn * oblong * Eigen::Vector3d(1, -1, 1).asDiagonal();
-  for (Lattice& lattice : result) {
-    lattice.to_world.linear() *= mean_edge;
-    lattice.to_world.translation() = Eigen::Vector3d(3, -2, 1);
-  }
+  const Matrix3d oblong = Vector3d(0.5, 1, 2).asDiagonal();
+  const Matrix3d turned = Eigen::AngleAxisd(0.7, Vector3d(1, -2, 3).normalized()) * oblong;
+  const std::pair<std::string, Matrix3d> edges[] = {{"cubes", Matrix3d::Identity()},
+                                                    {"oblong", oblong},
+                                                    {"turned_oblong", turned},
+                                                    {"mirrored_cubes", Vector3d(-1, 1, 1).asDiagonal()},
+                                                    {"mirrored_turned", turned * Vector3d(1, -1, 1).asDiagonal()}};
+  std::vector<Lattice> result;
+  for (const auto& [name, axes] : edges)
+    result.push_back({name, Eigen::Translation3d(3, -2, 1) * Affine3d(Matrix3d(mean_edge * axes))});
   return result;
 }
 
-inline Eigen::AlignedBox3i index_box(const Eigen::Vector3i& first, const Eigen::Vector3i& voxels) {
-  return {first, Eigen::Vector3i(first + voxels - Eigen::Vector3i::Ones())};
+inline AlignedBox3i index_box(const Vector3i& first, const Vector3i& voxels) {
+  return {first, Vector3i(first + voxels - Vector3i::Ones())};
 }
 
 /// The kind of field that packets trace.
@@ -105,13 +104,12 @@ inline TensorField cubic_field(const TensorGrid& grid) {
 
 /// `tensor` takes an index position and returns T times the edge of a voxel: s times its norm is the kick of a step of
 /// one voxel.
-inline TensorGrid lattice_grid(const Eigen::AlignedBox3i& box, const Lattice& lattice, const TensorFunction& tensor) {
-  return dense_grid(box, lattice.to_world, [&](const Eigen::Vector3i& index) {
-    return Eigen::Matrix3d(tensor(index.cast<double>()) / mean_edge);
-  });
+inline TensorGrid lattice_grid(const AlignedBox3i& box, const Lattice& lattice, const TensorFunction& tensor) {
+  return dense_grid(box, lattice.to_world,
+                    [&](const Vector3i& index) { return Matrix3d(tensor(index.cast<double>()) / mean_edge); });
 }
 
-inline TensorField lattice_field(const Eigen::AlignedBox3i& box, const Lattice& lattice, const TensorFunction& tensor) {
+inline TensorField lattice_field(const AlignedBox3i& box, const Lattice& lattice, const TensorFunction& tensor) {
   return cubic_field(lattice_grid(box, lattice, tensor));
 }
 
@@ -129,8 +127,8 @@ inline TensorGrid without_blocks(TensorGrid grid, double fraction, unsigned seed
 }
 
 /// Adds a ray, given in index space, once for each flexibility.
-inline void add_bundle(RayBatch& batch, const TensorField& field, const Eigen::Vector3d& from,
-                       const Eigen::Vector3d& along, const std::vector<double>& flexibilities) {
+inline void add_bundle(RayBatch& batch, const TensorField& field, const Vector3d& from, const Vector3d& along,
+                       const std::vector<double>& flexibilities) {
   for (const double s : flexibilities)
     batch.add(field.to_world() * from, (field.to_world().linear() * along).normalized(), s);
 }
@@ -139,32 +137,31 @@ inline void add_bundle(RayBatch& batch, const TensorField& field, const Eigen::V
 inline RayBatch random_rays(const TensorField& field, int bundles, const std::vector<double>& flexibilities,
                             unsigned seed) {
   Numbers numbers(seed);
-  const Eigen::AlignedBox3d& box = field.index_bounds();
+  const AlignedBox3d& box = field.index_bounds();
   RayBatch batch;
   for (int i = 0; i < bundles; ++i) {
-    Eigen::Vector3d target = numbers.in(box), along = numbers.direction();
+    Vector3d target = numbers.in(box), along = numbers.direction();
     const auto axis = static_cast<Eigen::Index>(numbers.below(3));
     const bool far = numbers.next() < 0.5;
-    double distance = box.diagonal().norm();
+    const double face = far ? box.max()[axis] : box.min()[axis], inwards = far ? -1 : 1;
+    double distance = 0;
     switch (i % 8) {
       case 0:  // Begins inside.
-        distance = 0;
         break;
       case 1:  // On a face, inwards or outwards.
-        target[axis] = far ? box.max()[axis] : box.min()[axis];
-        distance = 0;
+        target[axis] = face;
         break;
       case 2:  // Passes by.
-        target[axis] = far ? box.max()[axis] + 0.5 : box.min()[axis] - 0.5;
+        target[axis] = face - 0.5 * inwards;
         along[axis] = 0;
+        distance = box.diagonal().norm();
         break;
       case 3:  // Along a face.
-        distance = 0;
-        target[axis] = far ? box.max()[axis] - 0.3 * numbers.next() : box.min()[axis] + 0.3 * numbers.next();
+        target[axis] = face + 0.3 * inwards * numbers.next();
         along[axis] *= 0.1;
         break;
       default:
-        break;
+        distance = box.diagonal().norm();
     }
     add_bundle(batch, field, target - distance * along.normalized(), along, flexibilities);
   }
@@ -175,11 +172,9 @@ inline RayBatch random_rays(const TensorField& field, int bundles, const std::ve
 inline std::vector<double> wavelengths(double kick) { return {0.2 * kick, -0.4 * kick, 0.6 * kick, 0.8 * kick, kick}; }
 
 /// Extents that begin and end anywhere in a brick.
-inline Eigen::AlignedBox3i odd_box() { return index_box({-13, 5, -30}, {27, 34, 41}); }
+inline AlignedBox3i odd_box() { return index_box({-13, 5, -30}, {27, 34, 41}); }
 
-inline double distance_in_voxels(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return (a - b).norm() / mean_edge;
-}
+inline double distance_in_voxels(const Vector3d& a, const Vector3d& b) { return (a - b).norm() / mean_edge; }
 
 struct Scene {
   std::string name;
@@ -220,7 +215,7 @@ inline RayBatch turned_a_little(const Scene& scene) {
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const double turn = 3e-7 * std::max(1.0, strength * std::abs(rays.flexibility[i]));
     rays.flexibility[i] *= 1 + 3e-7;
-    const Eigen::Vector3d across = upright(rays.direction[i], Eigen::Vector3d(1, 2, 3).normalized());
+    const Vector3d across = upright(rays.direction[i], Vector3d(1, 2, 3).normalized());
     rays.direction[i] = (rays.direction[i] + std::min(turn, 1.0) * across).normalized();
   }
   return rays;
@@ -250,8 +245,8 @@ inline std::string description(const TensorField& field, const RayBatch& rays, s
 inline bool ends_beside_face(const Scene& scene, const RayBatch& rays, std::size_t i) {
   if (rays.end[i] != RayEnd::missed || rays.steps[i] == 0) return false;
   if (scene.geometry.has_cut() || std::isfinite(scene.settings.max_length)) return false;
-  const Eigen::Vector3d index = scene.field.to_index() * rays.position[i];
-  const Eigen::AlignedBox3d& box = scene.field.index_bounds();
+  const Vector3d index = scene.field.to_index() * rays.position[i];
+  const AlignedBox3d& box = scene.field.index_bounds();
   return std::min((index - box.min()).cwiseAbs().minCoeff(), (index - box.max()).cwiseAbs().minCoeff()) > 1e-6;
 }
 
@@ -281,22 +276,24 @@ inline void expect_reference(const Scene& scene, double sensitive = 0) {
   EXPECT_TRUE(adaptive || static_cast<double>(steps_apart) <= 0.02 * count + 1) << "rounding at faces is rare";
 }
 
+/// Distances between the ends of rays, in voxels, sorted.
+inline std::vector<double> distances(const RayBatch& a, const RayBatch& b) {
+  std::vector<double> result;
+  for (std::size_t i = 0; i < a.size(); ++i) result.push_back(distance_in_voxels(a.position[i], b.position[i]));
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
 /// Where errors decide about automatic steps, they depend on rounding. The errors of packets are then as large as those
 /// of the reference, but not equal to them. Both are compared with the reference at a hundredth of the tolerance.
 inline void expect_as_exact_as_reference(const Scene& scene) {
   SCOPED_TRACE(scene.name);
-  const RayBatch fast = traced(scene, scene.rays), reference = traced_by_reference(scene, scene.rays);
   BendingSettings settings = scene.settings;
   settings.tolerance /= 100;
   RayBatch truth = scene.rays;
   trace_reference(scene.field, scene.geometry, settings, truth);
-  std::vector<double> errors, usual_errors;
-  for (std::size_t i = 0; i < truth.size(); ++i) {
-    errors.push_back(distance_in_voxels(fast.position[i], truth.position[i]));
-    usual_errors.push_back(distance_in_voxels(reference.position[i], truth.position[i]));
-  }
-  std::sort(errors.begin(), errors.end());
-  std::sort(usual_errors.begin(), usual_errors.end());
+  const std::vector<double> errors = distances(traced(scene, scene.rays), truth);
+  const std::vector<double> usual_errors = distances(traced_by_reference(scene, scene.rays), truth);
   for (const double part : {0.5, 0.75, 0.9}) {
     const auto i = static_cast<std::size_t>(part * static_cast<double>(errors.size()));
     EXPECT_LE(errors[i], 2 * usual_errors[i] + position_tolerance) << part;
@@ -304,12 +301,71 @@ inline void expect_as_exact_as_reference(const Scene& scene) {
   }
 }
 
-/// Whether a ray of one batch and one of another have the same bytes.
+/// Whether a ray of one batch and one of another are the same, bit for bit, in all that both batches have.
 inline bool identical(const RayBatch& a, std::size_t i, const RayBatch& b, std::size_t j) {
-  return std::memcmp(&a.position[i], &b.position[j], sizeof a.position[i]) == 0 &&
-         std::memcmp(&a.direction[i], &b.direction[j], sizeof a.direction[i]) == 0 &&
-         std::memcmp(&a.length[i], &b.length[j], sizeof a.length[i]) == 0 && a.steps[i] == b.steps[j] &&
-         a.end[i] == b.end[j];
+  const auto numbers_of = [&](const RayBatch& rays, std::size_t k) {
+    std::vector<Vector3d> all{rays.position[k], rays.direction[k]};
+    all.emplace_back(rays.length[k], rays.steps[k], static_cast<int>(rays.end[k]));
+    if (a.wants_log_radiance_scale && b.wants_log_radiance_scale) all.emplace_back(rays.log_radiance_scale[k], 0, 0);
+    if (!a.differentials.empty() && !b.differentials.empty())
+      for (const auto& derivatives : {rays.differentials[k].position, rays.differentials[k].direction})
+        all.insert(all.end(), {derivatives.col(0), derivatives.col(1)});
+    return all;
+  };
+  const std::vector<Vector3d> one = numbers_of(a, i), other = numbers_of(b, j);
+  return std::memcmp(one.data(), other.data(), one.size() * sizeof(Vector3d)) == 0;
+}
+
+/// Traces some rays of a scene, in any order: they are those of the whole batch, to the last bit.
+inline void expect_identical(const Scene& scene, const RayBatch& all, const std::vector<std::size_t>& order) {
+  const RayBatch& rays = scene.rays;
+  RayBatch some;
+  some.wants_log_radiance_scale = rays.wants_log_radiance_scale;
+  for (const std::size_t i : order) some.add(rays.position[i], rays.direction[i], rays.flexibility[i]);
+  some = traced(scene, some);
+  std::size_t differ = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (identical(some, i, all, order[i]) || ++differ > 3) continue;
+    ADD_FAILURE() << "ray " << order[i] << ", s " << rays.flexibility[order[i]]
+                  << ":\n  here: " << description(scene.field, some, i)
+                  << "\n  in the batch: " << description(scene.field, all, order[i]);
+  }
+  EXPECT_EQ(differ, 0u);
+}
+
+/// Rays with derivatives, along a parallel shift and along a shift with a turn.
+inline RayBatch with_differentials(RayBatch rays) {
+  for (const Vector3d& direction : rays.direction) {
+    RayDifferential differential;
+    const Vector3d across = upright(direction, Vector3d(1, 2, 3).normalized());
+    differential.position.col(0) = across;
+    differential.position.col(1) = direction.cross(across);
+    differential.direction.col(1) = 0.3 * direction.cross(across);
+    rays.differentials.push_back(differential);
+  }
+  return rays;
+}
+
+/// Compares the differentials of packets with those of the reference.
+inline void expect_differentials(const Scene& scene, double tolerance) {
+  SCOPED_TRACE(scene.name);
+  const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
+  RayBatch turned = turned_a_little(scene);
+  turned.differentials = scene.rays.differentials;
+  const RayBatch moved = traced_by_reference(scene, turned);
+  std::size_t compared = 0;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    const auto apart = [&](const RayBatch& a) {
+      const RayDifferential &of = a.differentials[i], &right = exact.differentials[i];
+      return std::max((of.position - right.position).norm() / right.position.norm(),
+                      (of.direction - right.direction).norm() / (right.direction.norm() + right.position.norm()));
+    };
+    if (moved.end[i] != exact.end[i] || apart(moved) > 1e-4) continue;  // The light grazes a surface.
+    ++compared;
+    EXPECT_EQ(fast.end[i], exact.end[i]);
+    EXPECT_LT(apart(fast), tolerance) << "ray " << i << " after " << exact.steps[i] << " steps";
+  }
+  EXPECT_GT(compared, exact.size() * 8 / 10);
 }
 
 /// Tests that run with each of the kernel's instruction sets.

@@ -18,12 +18,12 @@ inline std::vector<Path> some_paths(std::size_t count) {
     for (std::size_t j = 0; j < i + 2; ++j) {
       PathPoint point;
       const auto random = [&](Eigen::Index, Eigen::Index) { return uniform(engine); };
-      point.position = Eigen::Vector3d(1e4, 0, 0) + Eigen::Vector3d::NullaryExpr(3, 1, random);
-      point.direction = Eigen::Vector3d::NullaryExpr(3, 1, random).eval().normalized();
+      point.position = Vector3d(1e4, 0, 0) + Vector3d::NullaryExpr(3, 1, random);
+      point.direction = Vector3d::NullaryExpr(3, 1, random).eval().normalized();
       point.length = path.points.empty() ? 0 : path.points.back().length + 1 + uniform(engine);
       point.in_field = j > 0;
-      if (point.in_field) point.tensor = Eigen::Matrix3d::NullaryExpr(3, 3, random);
-      if (point.in_field) point.change = Eigen::Vector3d::NullaryExpr(3, 1, random);
+      if (point.in_field) point.tensor = Matrix3d::NullaryExpr(3, 3, random);
+      if (point.in_field) point.change = Vector3d::NullaryExpr(3, 1, random);
       path.points.push_back(point);
     }
     path.flexibility = uniform(engine);
@@ -38,12 +38,8 @@ inline std::vector<Path> some_paths(std::size_t count) {
 inline void expect_same(const PathPoints& a, const PathPoints& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_EQ(a[i].position, b[i].position);
-    EXPECT_EQ(a[i].direction, b[i].direction);
-    EXPECT_EQ(a[i].length, b[i].length);
-    EXPECT_EQ(a[i].tensor, b[i].tensor);
-    EXPECT_EQ(a[i].change, b[i].change);
-    EXPECT_EQ(a[i].in_field, b[i].in_field);
+    const PathPoint& p = b[i];
+    EXPECT_THAT(a[i], testing::FieldsAre(p.position, p.direction, p.length, p.in_field, p.tensor, p.change)) << i;
   }
 }
 
@@ -51,10 +47,8 @@ inline void expect_same(const std::vector<Path>& a, const std::vector<Path>& b) 
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     expect_same(a[i].points, b[i].points);
-    EXPECT_EQ(a[i].flexibility, b[i].flexibility);
-    EXPECT_EQ(a[i].wavelength, b[i].wavelength);
-    EXPECT_EQ(a[i].end, b[i].end);
-    EXPECT_EQ(a[i].backward_end, b[i].backward_end);
+    const Path& path = b[i];
+    EXPECT_THAT(a[i], testing::FieldsAre(testing::_, path.flexibility, path.wavelength, path.end, path.backward_end));
   }
 }
 

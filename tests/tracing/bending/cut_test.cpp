@@ -1,6 +1,7 @@
 #include <random>
 #include <utility>
 
+#include "tests/renderer/shapes.h"
 #include "tests/tracing/support.h"
 #include "tracing/steps/scalar_tracer.h"
 
@@ -15,33 +16,16 @@ using Parts = std::vector<TriangleMesh>;
 
 /// The same box with the other diagonal on each face, which mirroring makes.
 TriangleMesh mirrored_part(const Vector3d& low, const Vector3d& high) {
-  TriangleMesh box = box_between({-high.x(), low.y(), low.z()}, {-low.x(), high.y(), high.z()});
-  for (Vector3d& vertex : box.vertices) vertex.x() = -vertex.x();
-  for (auto& triangle : box.triangles) std::swap(triangle[0], triangle[1]);
-  return box;
+  const Affine3d mirror(Eigen::Scaling(-1.0, 1.0, 1.0));
+  return box_between({-high.x(), low.y(), low.z()}, {-low.x(), high.y(), high.z()}, mirror);
 }
 
-/// Rings of latitude about a centre; a pole is a vertex of many triangles.
+/// Rings of latitude about a centre; a pole is a corner of many triangles.
 TriangleMesh ball_part(const Vector3d& center, double radius) {
-  constexpr std::uint32_t around = 16, rings = 7;
-  TriangleMesh ball;
-  for (std::uint32_t ring = 1; ring <= rings; ++ring)
-    for (std::uint32_t i = 0; i < around; ++i) {
-      const double polar = M_PI * ring / (rings + 1), angle = 2 * M_PI * i / around;
-      ball.vertices.push_back(center + radius * Vector3d(std::sin(polar) * std::cos(angle),
-                                                         std::sin(polar) * std::sin(angle), std::cos(polar)));
-    }
-  const std::uint32_t top = rings * around, bottom = top + 1;
-  ball.vertices.push_back(center + Vector3d(0, 0, radius));
-  ball.vertices.push_back(center - Vector3d(0, 0, radius));
-  for (std::uint32_t i = 0; i < around; ++i) {
-    const std::uint32_t next = (i + 1) % around, last = (rings - 1) * around;
-    ball.triangles.push_back({top, i, next});
-    ball.triangles.push_back({bottom, last + next, last + i});
-    for (std::uint32_t row = 0; row < last; row += around) {
-      ball.triangles.push_back({row + i, row + around + i, row + around + next});
-      ball.triangles.push_back({row + i, row + around + next, row + next});
-    }
+  auto ball = std::get<TriangleMesh>(sphere(8).shape);
+  for (Vector3d& vertex : ball.vertices) {
+    if (std::abs(vertex.z()) == 1) vertex.head<2>().setZero();  // All corners at a pole are at one place.
+    vertex = center + radius * vertex;
   }
   return ball;
 }
@@ -109,22 +93,22 @@ std::vector<CutCase> cut_cases() {
   Parts with_ball = cells(-half, half, 2);
   with_ball.push_back(ball_part({0.25, 0, 0.5}, 0.4));
   return {
-      {"a box", {box_between(-half, half)}},
-      {"a box that fills the volume", {box_between(-one, one)}},
-      {"a box beyond the volume", {box_between(-2 * one, 1.1 * one)}},
-      {"a layer of the volume", {box_between({-1, -1, -0.125}, {1, 1, 0.125})}},
-      {"a ball", {ball_part({0, 0, 0}, 0.75)}},
-      {"a box twice", {box_between(-half, half), box_between(-half, half)}},
-      {"a box twice, other diagonals", {box_between(-half, half), mirrored_part(-half, half)}},
-      {"touching boxes", {column(-0.5, 0.5), column(0, 0.5)}},
-      {"touching boxes, other diagonals", {column(-0.5, 0.5), column(0, 0.5, true)}},
-      {"overlapping boxes", {column(-0.5, 0.6), column(-0.1, 0.6, true)}},
-      {"boxes with an edge in common", {box_between(-half, {0, 0, 0.5}), box_between({0, 0, -0.5}, half)}},
-      {"boxes with a vertex in common", {box_between(-half, {0, 0, 0}), box_between({0, 0, 0}, half)}},
-      {"a box in a box", {box_between(-half, half), box_between(-half / 2, half / 2)}},
-      {"balls that touch", {ball_part({-0.4, 0, 0}, 0.4), ball_part({0.4, 0, 0}, 0.4)}},
-      {"cells that fill the volume", cells(-one, one, 4)},
-      {"cells and a ball", with_ball},
+      {"ABox", {box_between(-half, half)}},
+      {"ABoxThatFillsTheVolume", {box_between(-one, one)}},
+      {"ABoxBeyondTheVolume", {box_between(-2 * one, 1.1 * one)}},
+      {"ALayerOfTheVolume", {box_between({-1, -1, -0.125}, {1, 1, 0.125})}},
+      {"ABall", {ball_part({0, 0, 0}, 0.75)}},
+      {"ABoxTwice", {box_between(-half, half), box_between(-half, half)}},
+      {"ABoxTwiceOtherDiagonals", {box_between(-half, half), mirrored_part(-half, half)}},
+      {"TouchingBoxes", {column(-0.5, 0.5), column(0, 0.5)}},
+      {"TouchingBoxesOtherDiagonals", {column(-0.5, 0.5), column(0, 0.5, true)}},
+      {"OverlappingBoxes", {column(-0.5, 0.6), column(-0.1, 0.6, true)}},
+      {"BoxesWithAnEdgeInCommon", {box_between(-half, {0, 0, 0.5}), box_between({0, 0, -0.5}, half)}},
+      {"BoxesWithAVertexInCommon", {box_between(-half, {0, 0, 0}), box_between({0, 0, 0}, half)}},
+      {"ABoxInABox", {box_between(-half, half), box_between(-half / 2, half / 2)}},
+      {"BallsThatTouch", {ball_part({-0.4, 0, 0}, 0.4), ball_part({0.4, 0, 0}, 0.4)}},
+      {"CellsThatFillTheVolume", cells(-one, one, 4)},
+      {"CellsAndABall", with_ball},
   };
 }
 
@@ -136,22 +120,21 @@ std::pair<Vector3d, Vector3d> a_line(LineKind kind, std::mt19937& random) {
   std::normal_distribution<double> normal;
   std::uniform_int_distribution<int> grid(-8, 8), axis_of(0, 2), step(-1, 1);
   const auto on_grid = [&] { return Vector3d(grid(random) / 8.0, grid(random) / 8.0, grid(random) / 8.0); };
-  Vector3d through = on_grid(), along = Vector3d::Zero();
+  const auto anywhere = [&] { return Vector3d(normal(random), normal(random), normal(random)); };
+  Vector3d through = on_grid(), along = anywhere();
   const int axis = axis_of(random);
   switch (kind) {
     case LineKind::random:
-      through = 0.5 * Vector3d(normal(random), normal(random), normal(random));
-      along = Vector3d(normal(random), normal(random), normal(random));
+      through = 0.5 * anywhere();
       break;
     case LineKind::through_vertices:
-      while (along.isZero()) along = Vector3d(step(random), step(random), step(random));
+      do along = Vector3d(step(random), step(random), step(random));
+      while (along.isZero());
       break;
     case LineKind::in_faces:
-      along = Vector3d(normal(random), normal(random), normal(random));
       along[axis] = 0;
       break;
     case LineKind::grazing:
-      along = Vector3d(normal(random), normal(random), normal(random));
       along[axis] = std::pow(10, -2 - 2 * std::abs(normal(random))) * step(random);
       through[axis] += std::pow(10, -6 - 2 * std::abs(normal(random))) * step(random);
       break;
@@ -162,8 +145,6 @@ std::pair<Vector3d, Vector3d> a_line(LineKind kind, std::mt19937& random) {
 
 class CutTest : public testing::TestWithParam<CutCase> {
  protected:
-  static constexpr int per_kind = 1000;
-
   static const TensorField& field() {
     static const TensorField result(cube_grid(Vector3i::Constant(17), [](const Vector3d&) { return general_tensor(); }),
                                     {Interpolation::cubic, Border::extend});
@@ -186,7 +167,7 @@ class CutTest : public testing::TestWithParam<CutCase> {
   static RayBatch lines(LineKind kind, double flexibility) {
     RayBatch batch;
     std::mt19937 random(7);
-    for (int i = 0; i < per_kind; ++i) {
+    for (int i = 0; i < 1000; ++i) {
       const auto [from, along] = a_line(kind, random);
       batch.add(from, along, flexibility);
     }
@@ -203,7 +184,7 @@ class CutTest : public testing::TestWithParam<CutCase> {
       }
     RayBatch ends = around;
     trace_reference(field(), geometry, {}, ends);
-    Eigen::AlignedBox3d turns;
+    AlignedBox3d turns;
     for (std::size_t i = 0; i < ends.size(); ++i) turns.extend(ends.direction[i] - around.direction[i]);
     return turns.diagonal().norm();
   }
@@ -278,14 +259,8 @@ TEST(CutWithInnerFaces, BendsLightAsItsSkinDoes) {
   }
 }
 
-std::string name_of(const testing::TestParamInfo<CutCase>& info) {
-  std::string name;
-  for (const char c : info.param.name)
-    if (std::isalnum(static_cast<unsigned char>(c))) name += c;
-  return name;
-}
-
-INSTANTIATE_TEST_SUITE_P(Bodies, CutTest, testing::ValuesIn(cut_cases()), name_of);
+INSTANTIATE_TEST_SUITE_P(Bodies, CutTest, testing::ValuesIn(cut_cases()),
+                         [](const auto& each) { return each.param.name; });
 
 }  // namespace
 }  // namespace tensorray::test

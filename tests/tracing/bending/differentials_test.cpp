@@ -6,12 +6,6 @@
 namespace tensorray {
 namespace {
 
-/// One ray with its derivatives along the two axes across its direction.
-struct Traced {
-  Ray ray;
-  RayDifferential differential;
-};
-
 /// The start of a ray as a function of two parameters: its position moves across, and its direction turns.
 struct Start {
   Vector3d position, direction, across[2];
@@ -30,8 +24,9 @@ Start make_start(const Vector3d& position, const Vector3d& direction, double tur
   return start;
 }
 
-Traced trace_with_differential(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                               const Start& start, double flexibility) {
+/// One ray with its derivatives along the two axes across its direction.
+RayBatch trace_with_differential(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                                 const Start& start, double flexibility) {
   RayBatch batch;
   batch.add(start.position, start.direction, flexibility);
   RayDifferential differential;
@@ -41,33 +36,34 @@ Traced trace_with_differential(const TensorField& field, const Geometry& geometr
   }
   batch.differentials.push_back(differential);
   trace_reference(field, geometry, settings, batch);
-  return {{batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]}, batch.differentials[0]};
+  return batch;
 }
 
-/// Central differences of the rays' landings.
+/// Central differences of the rays' ends.
 RayDifferential finite_differences(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                                   const Start& start, double flexibility, double delta) {
+                                   const Start& start, double flexibility, double delta, RayEnd end = RayEnd::plate) {
   RayDifferential result;
   for (int i = 0; i < 2; ++i) {
-    Ray side[2];
-    for (int sign : {0, 1}) {
-      const double d = sign ? delta : -delta;
-      const Vector3d position = start.position_at(i == 0 ? d : 0, i == 1 ? d : 0);
-      const Vector3d direction = start.direction_at(i == 0 ? d : 0, i == 1 ? d : 0);
-      side[sign] = trace_one(field, geometry, settings, position, direction, flexibility);
-      EXPECT_EQ(side[sign].end, RayEnd::plate);
-    }
-    result.position.col(i) = (side[1].position - side[0].position) / (2 * delta);
-    result.direction.col(i) = (side[1].direction - side[0].direction) / (2 * delta);
+    const auto side = [&](double d) {
+      const double u = i == 0 ? d : 0, v = i == 1 ? d : 0;
+      return trace_one(field, geometry, settings, start.position_at(u, v), start.direction_at(u, v), flexibility);
+    };
+    const Ray above = side(delta), below = side(-delta);
+    EXPECT_TRUE(above.end == end && below.end == end);
+    result.position.col(i) = (above.position - below.position) / (2 * delta);
+    result.direction.col(i) = (above.direction - below.direction) / (2 * delta);
   }
   return result;
 }
 
 void expect_equal(const RayDifferential& a, const RayDifferential& b, double tolerance) {
-  EXPECT_LT((a.position - b.position).norm(), tolerance * b.position.norm()) << a.position << "\n" << b.position;
-  EXPECT_LT((a.direction - b.direction).norm(), tolerance * (b.direction.norm() + 0.1 * b.position.norm()))
-      << a.direction << "\n"
-      << b.direction;
+  for (int i = 0; i < 2; ++i) {
+    const double position = b.position.col(i).norm(), direction = b.direction.col(i).norm();
+    EXPECT_LT((a.position - b.position).col(i).norm(), tolerance * position) << a.position << "\n" << b.position;
+    EXPECT_LT((a.direction - b.direction).col(i).norm(), tolerance * (direction + 0.1 * position))
+        << a.direction << "\n"
+        << b.direction;
+  }
 }
 
 class RayDifferentials : public ::testing::TestWithParam<BendingMethod> {
@@ -87,11 +83,11 @@ class RayDifferentials : public ::testing::TestWithParam<BendingMethod> {
   double tolerance() const { return GetParam() == BendingMethod::euler ? 1e-2 : 2e-3; }
 
   void expect_finite_differences(const Geometry& geometry, const Start& start, double flexibility) {
-    const Traced traced = trace_with_differential(field_, geometry, settings(), start, flexibility);
-    ASSERT_EQ(traced.ray.end, RayEnd::plate);
+    const RayBatch traced = trace_with_differential(field_, geometry, settings(), start, flexibility);
+    ASSERT_EQ(traced.end[0], RayEnd::plate);
     const Ray alone = trace_one(field_, geometry, settings(), start.position, start.direction, flexibility);
-    EXPECT_LT((traced.ray.position - alone.position).norm(), 1e-9) << "differentials must not change the ray";
-    expect_equal(traced.differential, finite_differences(field_, geometry, settings(), start, flexibility, 1e-4),
+    EXPECT_LT((traced.position[0] - alone.position).norm(), 1e-9) << "differentials must not change the ray";
+    expect_equal(traced.differentials[0], finite_differences(field_, geometry, settings(), start, flexibility, 1e-4),
                  tolerance());
   }
 };
@@ -101,9 +97,8 @@ TEST_P(RayDifferentials, MatchFiniteDifferences) {
   behind.plate = plate_across(direction_, 3);
   tilted.plate = plate_across(Vector3d(0.5, 0.1, -1), 0.4);  // Inside the volume.
   Surfaces cut = behind;
-  Eigen::Affine3d turned = Eigen::Affine3d::Identity();
-  turned.linear() = Eigen::AngleAxisd(0.5, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-  cut.cut = box_mesh(Eigen::AlignedBox3d(Vector3d::Constant(-0.5), Vector3d::Constant(0.5)), turned);
+  const Affine3d turned(Eigen::AngleAxisd(0.5, Vector3d(1, 2, 3).normalized()));
+  cut.cut = box_between(Vector3d::Constant(-0.5), Vector3d::Constant(0.5), turned);
   for (const Surfaces& surfaces : {behind, tilted, cut}) expect_finite_differences(Geometry(surfaces), outside_, 0.5);
   expect_finite_differences(Geometry(behind), make_start({0.1, 0.05, 0.3}, direction_, 0), -0.5);
 }
@@ -115,73 +110,32 @@ INSTANTIATE_TEST_SUITE_P(EveryMethod, RayDifferentials,
 /// T = diag(a, b, 0): light along the z axis stays on it, and a beam near the axis spreads by δV' = s diag(a, b) δV.
 /// For parallel light δV begins at 0, so that it stays parallel. A beam that is not parallel is magnified.
 TEST(RayDifferential, ParallelLightAlongAnEigenvectorStaysParallel) {
-  const TensorField field = constant_field(Eigen::Vector3d(0.75, -0.5, 0).asDiagonal());
+  const TensorField field = constant_field(Vector3d(0.75, -0.5, 0).asDiagonal());
   const Geometry geometry = geometry_with(field, plate_across(-Vector3d::UnitZ(), 2));
-  const BendingSettings settings;
-  const Traced parallel =
-      trace_with_differential(field, geometry, settings, make_start({0, 0, 2}, -Vector3d::UnitZ(), 0), 1);
-  EXPECT_NEAR(parallel.differential.position.col(0).norm(), 1, 1e-9);
-  EXPECT_NEAR(parallel.differential.direction.norm(), 0, 1e-9);
-
-  // Within the volume, of depth 2, a turn grows along x by exp(0.75 · 2), and moves the ray sideways by the turn times
-  // ∫ exp(0.75 t) dt. The light is straight for one unit before the volume and for one unit behind it.
-  const double turn = 0.1;
-  const Traced turned =
-      trace_with_differential(field, geometry, settings, make_start({0, 0, 2}, -Vector3d::UnitZ(), turn), 1);
-  const double expected = 1 + turn * (1 + (std::exp(1.5) - 1) / 0.75 + std::exp(1.5));
-  // The error of the drift, with a step of ½ voxel (1/8), is of second order: h²/24 times the integral of the second
-  // derivative.
-  EXPECT_NEAR(turned.differential.position.col(0).norm(), expected, turn * 1e-2);
-  EXPECT_NEAR(turned.differential.direction.col(0).norm(), turn * std::exp(1.5), 1e-9);
+  for (const double turn : {0.0, 0.1}) {
+    const Start start = make_start({0, 0, 2}, -Vector3d::UnitZ(), turn);
+    const RayBatch spread = trace_with_differential(field, geometry, {}, start, 1);
+    // Within the volume, of depth 2, turns grow by exp(0.75 · 2) along x and by exp(-0.5 · 2) along y. The former moves
+    // the ray sideways by the turn times ∫ exp(0.75 t) dt. The light is straight for one unit before the volume and for
+    // one unit behind it. The error of the drift, with a step of ½ voxel (1/8), is of second order: h²/24 times the
+    // integral of the second derivative.
+    const double expected = 1 + turn * (1 + (std::exp(1.5) - 1) / 0.75 + std::exp(1.5));
+    EXPECT_NEAR(spread.differentials[0].position.col(0).norm(), expected, turn * 1e-2 + 1e-9);
+    EXPECT_NEAR(spread.differentials[0].direction.norm(), turn * std::hypot(std::exp(1.5), std::exp(-1)), 1e-9);
+  }
 }
 
 /// Strong kicks use another branch of the exponential.
 TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
   const TensorField field = cube_field(17, linear_tensor);
-  const Vector3d direction(0, 0, -1);
-  const Geometry geometry = geometry_with(field, plate_across(direction, 1));
-  const BendingSettings settings = settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ is about 8.
-  const Start start = make_start({0.1, -0.2, 0.3}, direction, 0);
-  RayBatch batch;
-  batch.add(start.position, start.direction, 8);
-  BendingSettings one_step = settings;
-  one_step.max_steps = 1;
-  batch.differentials.push_back({(Eigen::Matrix<double, 3, 2>() << start.across[0], start.across[1]).finished(), {}});
-  batch.differentials[0].direction.setZero();
-  trace_reference(field, geometry, one_step, batch);
-  ASSERT_EQ(batch.end[0], RayEnd::step_limit);
-  for (int i = 0; i < 2; ++i) {
-    const double d = 1e-5;
-    const auto side = [&](double sign) {
-      return trace_one(field, geometry, one_step, start.position + sign * d * start.across[i], direction, 8);
-    };
-    const Vector3d position = (side(1).position - side(-1).position) / (2 * d);
-    const Vector3d turned = (side(1).direction - side(-1).direction) / (2 * d);
-    // Both take the same steps, so that only the error of the finite differences remains.
-    EXPECT_LT((batch.differentials[0].position.col(i) - position).norm(), 1e-6 * position.norm());
-    EXPECT_LT((batch.differentials[0].direction.col(i) - turned).norm(), 1e-6 * (1 + turned.norm()));
-  }
-}
-
-TEST(RayDifferential, LengthIsThatOfTheWay) {
-  const TensorField field = constant_field(Eigen::Matrix3d::Zero());
-  const Vector3d direction = Vector3d(0.3, 0.1, -1).normalized();
-  RayBatch batch;
-  batch.add(-2 * direction, direction, 1);
-  trace_reference(field, geometry_with(field, plate_across(direction, 3)), {}, batch);
-  EXPECT_NEAR(batch.length[0], 5, 1e-9);
-
-  // A circle: an antisymmetric tensor turns light at a constant rate, and the length is the angle divided by this rate.
-  Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();
-  turning(0, 2) = 0.5;
-  turning(2, 0) = -0.5;
-  const TensorField circle = constant_field(turning);
-  RayBatch arc;
-  arc.add({0, 0, 0.9}, {0, 0, -1}, 1);
-  trace_reference(circle, Geometry(surfaces_of(circle)), settings_of(BendingMethod::splitting, 1.0 / 16), arc);
-  ASSERT_EQ(arc.end[0], RayEnd::missed);
-  const double angle = std::acos(-arc.direction[0].z());
-  EXPECT_NEAR(arc.length[0], angle / 0.5, 1e-4);
+  const Geometry geometry(surfaces_of(field));
+  BendingSettings settings = settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ is about 8.
+  settings.max_steps = 1;
+  const Start start = make_start({0.1, -0.2, 0.3}, {0, 0, -1}, 0);
+  const RayBatch traced = trace_with_differential(field, geometry, settings, start, 8);
+  // Both take the same steps, so that only the error of the finite differences remains.
+  expect_equal(traced.differentials[0],
+               finite_differences(field, geometry, settings, start, 8, 1e-5, RayEnd::step_limit), 1e-6);
 }
 
 }  // namespace

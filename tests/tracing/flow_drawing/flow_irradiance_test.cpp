@@ -2,27 +2,17 @@
 
 #include <memory>
 #include <numeric>
-#include <optional>
 
 #include "renderer/light_maps/photon_map.h"
 #include "renderer/lights/lights.h"
-#include "tests/tracing/support.h"
+#include "tests/renderer/shapes.h"
+#include "tests/tracing/flow_support.h"
 
 namespace tensorray {
 namespace {
 
-Plate floor_plate(double size) {
-  Plate plate;
-  plate.center = {0, 0, -1.5};
-  plate.size = {size, size};
-  plate.resolution = {64, 64};
-  return plate;
-}
-
 FlowIrradiance land(const TensorField& field, const LandingLight& light, const Plate& plate) {
-  const auto landed = flow_irradiance(field, surfaces_of(field), plate, light, {{}, 64, 20000}, {});
-  if (!landed) throw std::runtime_error("no light landed");
-  return *landed;
+  return flow_irradiance(field, surfaces_of(field), plate, light, {{}, 64, 20000}, {}).value();
 }
 
 LandingLight sun(const Vector3d& direction) {
@@ -33,19 +23,14 @@ LandingLight sun(const Vector3d& direction) {
 }
 
 TensorField bending_field() {
-  return cube_field(17, [](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T(0, 0) = p.x();
-    T(1, 0) = 0.5;
-    return T;
-  });
+  return cube_field(
+      17, [](const Vector3d& p) { return Matrix3d(Vector3d(p.x(), 0.5, 0) * Vector3d::UnitX().transpose()); });
 }
 
 /// Irradiance times area, over the whole plate.
 double power(const FlowIrradiance& landed, int band) {
-  double sum = 0;
-  for (std::size_t i = 0; i < landed.irradiance.plane_size(); ++i) sum += landed.irradiance.plane(band)[i];
-  return sum * landed.plate.pixel_area();
+  const double* const light = landed.irradiance.plane(band);
+  return std::accumulate(light, light + landed.irradiance.plane_size(), 0.0) * landed.plate.pixel_area();
 }
 
 LandingLight lamp(const Vector3d& source) {
@@ -68,7 +53,7 @@ double solid_angle_of_top(const Vector3d& from) {
 TEST(FlowIrradianceTest, BentLightKeepsItsPower) {
   const TensorField field = bending_field();
   const auto expect_power = [&](const LandingLight& light, double expected, double tolerance) {
-    const FlowIrradiance landed = land(field, light, floor_plate(40));
+    const FlowIrradiance landed = land(field, light, plate_at(1.5, 40, 64));
     for (int band = 0; band < 2; ++band) EXPECT_NEAR(power(landed, band), expected, tolerance) << band;
   };
   LandingLight light = sun({0.2, 0.1, -1});
@@ -87,7 +72,7 @@ TEST(FlowIrradianceTest, BentLightKeepsItsPower) {
 TEST(FlowIrradianceTest, LightOfAPointFallsWithTheSquareOfTheDistance) {
   const TensorField field = constant_field(Matrix3d::Zero());
   const Vector3d source(0.3, 0.2, 4);
-  const FlowIrradiance landed = land(field, lamp(source), floor_plate(12));
+  const FlowIrradiance landed = land(field, lamp(source), plate_at(1.5, 12, 64));
   std::vector<double> errors;
   for (int y = 0; y < landed.irradiance.height; ++y)
     for (int x = 0; x < landed.irradiance.width; ++x) {
@@ -105,15 +90,13 @@ TEST(FlowIrradianceTest, LightOfAPointFallsWithTheSquareOfTheDistance) {
 }
 
 TEST(FlowIrradianceTest, APointWithinTheVolumeIsRefused) {
-  EXPECT_THROW(land(constant_field(Matrix3d::Zero()), lamp({0.5, 0, 0}), floor_plate(12)), std::invalid_argument);
+  EXPECT_THROW(land(constant_field(Matrix3d::Zero()), lamp({0.5, 0, 0}), plate_at(1.5, 12, 64)), std::invalid_argument);
 }
 
 /// A plane across the light, behind all of a body within 3 units of (0, 0, −2).
 Plate plane_behind(const Vector3d& direction) {
-  Plate plate;
-  plate.up = upright(direction, Vector3d::UnitY());
-  plate.right = plate.up.cross(-direction);
-  plate.center = Vector3d(0, 0, -2) + 4 * direction;
+  Plate plate = plate_across(direction, 4);
+  plate.center += Vector3d(0, 0, -2);
   plate.size = {6, 6};
   plate.resolution = {64, 64};
   return plate;
@@ -123,48 +106,48 @@ TriangleMesh square_at(const Vector3d& center, double size) {
   return rectangle_mesh(center, Vector3d::UnitX(), Vector3d::UnitY(), {size, size});
 }
 
-std::optional<FlowIrradiance> land_on(const TriangleMesh& body, const TensorField& field, const LandingLight& light) {
+/// Light from above through a field that does not bend it, on a body.
+FlowIrradiance land_on(const TriangleMesh& body) {
+  const TensorField field = constant_field(Matrix3d::Zero());
   Surfaces surfaces = surfaces_of(field);
   surfaces.body = body;
-  return flow_irradiance(field, surfaces, plane_behind(light.direction), light, {{}, 192, 40000}, {});
+  const LandingLight light = sun({0, 0, -1});
+  return flow_irradiance(field, surfaces, plane_behind(light.direction), light, {{}, 192, 40000}, {}).value();
 }
 
-/// The irradiance, on a surface that faces the light, of a point.
-double irradiance_at(const FlowIrradiance& landed, int band, const Vector3d& point) {
-  const Eigen::Vector2i at = landed.plate.to_pixel(point).array().floor().cast<int>();
+/// The irradiance of the first band, on a surface that faces the light, of a point.
+double irradiance_at(const FlowIrradiance& landed, const Vector3d& point) {
+  const Vector2i at = landed.plate.to_pixel(point).array().floor().cast<int>();
   if (at.minCoeff() < 0 || (at.array() >= landed.plate.resolution.array()).any()) return 0;
-  return landed.irradiance.plane(band)[at.y() * landed.irradiance.width + at.x()];
+  return landed.irradiance.plane(0)[at.y() * landed.irradiance.width + at.x()];
 }
 
 /// Of a sun and of a lamp. Means over squares; within a triangle of the map light is even.
 TEST(FlowIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
   const TensorField field = bending_field();
-  Plate plate = floor_plate(8);
   const Vector3d normal = Vector3d(0.3, -0.2, 1).normalized();
+  Plate plate = plate_across(-normal, 0);
   plate.center = {0, 0, -2.2};
-  plate.up = upright(normal, Vector3d::UnitY());
-  plate.right = plate.up.cross(normal);
+  plate.size = {8, 8};
+  plate.resolution = {64, 64};
   Surfaces surfaces = surfaces_of(field);
   surfaces.body = TriangleMesh{plate.corners(), {{0, 1, 2}, {0, 2, 3}}};
   for (const LandingLight& light : {sun({0.2, 0.1, -1}), lamp({0.5, 0.3, 4})}) {
     Plate behind = plane_behind(light.source ? Vector3d((plate.center - *light.source).normalized()) : light.direction);
     behind.size = {16, 16};
-    const auto body = flow_irradiance(field, surfaces, behind, light, {{}, 192, 40000}, {});
-    ASSERT_TRUE(body);
+    const FlowIrradiance body = flow_irradiance(field, surfaces, behind, light, {{}, 192, 40000}, {}).value();
     const auto map_of = [&](const FlowIrradiance& from, bool is_body) {
       IrradianceMap result;
       result.plate = from.plate;
       result.source = light.source;
       result.towards = -light.direction;
       result.bands = 1;
-      ShadedSurface shown;
-      shown.shape = *surfaces.body;
-      if (is_body) result.body = std::make_shared<SurfaceScene>(std::vector{shown});
+      if (is_body) result.body = std::make_shared<SurfaceScene>(std::vector{surface_of(*surfaces.body)});
       for (std::size_t i = 0; i < from.irradiance.plane_size(); ++i)
         result.irradiance.push_back(static_cast<float>(from.irradiance.plane(0)[i]));
       return result;
     };
-    const IrradianceMap on_body = map_of(*body, true), on_plate = map_of(land(field, light, plate), false);
+    const IrradianceMap on_body = map_of(body, true), on_plate = map_of(land(field, light, plate), false);
     for (const double x : {-0.5, 0.0, 0.4}) {
       Eigen::ArrayXd with_body = Eigen::ArrayXd::Zero(1), with_plate = with_body;
       for (int i = 0; i < 400; ++i) {
@@ -183,31 +166,25 @@ TEST(FlowIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
 }
 
 TEST(FlowIrradianceTest, OnlyTheFirstLayerOfABodyHasLight) {
-  const TensorField field = constant_field(Matrix3d::Zero());
   // The second square is below the first, half of the third is.
-  const TriangleMesh body =
-      joined({square_at({0, 0, -2}, 0.5), square_at({0, 0, -2.5}, 0.5), square_at({0.25, 0, -2.25}, 0.5)});
-  const auto landed = land_on(body, field, sun({0, 0, -1}));
-  ASSERT_TRUE(landed);
-  EXPECT_NEAR(irradiance_at(*landed, 0, {0, 0, 0}), 1, 2e-3);
-  EXPECT_NEAR(irradiance_at(*landed, 0, {0.35, 0, 0}), 1, 2e-3);
-  EXPECT_NEAR(power(*landed, 0), 0.75 * 0.5, 0.005);
+  const FlowIrradiance landed =
+      land_on(joined({square_at({0, 0, -2}, 0.5), square_at({0, 0, -2.5}, 0.5), square_at({0.25, 0, -2.25}, 0.5)}));
+  EXPECT_NEAR(irradiance_at(landed, {0, 0, 0}), 1, 2e-3);
+  EXPECT_NEAR(irradiance_at(landed, {0.35, 0, 0}), 1, 2e-3);
+  EXPECT_NEAR(power(landed, 0), 0.75 * 0.5, 0.005);
 }
 
 TEST(FlowIrradianceTest, LightThatMeetsABodyBeforeTheVolumeIsNotCounted) {
-  const TensorField field = constant_field(Matrix3d::Zero());
   // Above the left half of the volume, and below its right half.
-  const TriangleMesh body = joined({square_at({-1, 0, 1.5}, 2), square_at({1, 0, -1.5}, 2)});
-  const auto landed = land_on(body, field, sun({0, 0, -1}));
-  ASSERT_TRUE(landed);
-  EXPECT_EQ(irradiance_at(*landed, 0, {-0.5, 0, 0}), 0);
-  EXPECT_NEAR(irradiance_at(*landed, 0, {0.5, 0, 0}), 1, 2e-3);
-  EXPECT_NEAR(power(*landed, 0), 2, 0.02);
+  const FlowIrradiance landed = land_on(joined({square_at({-1, 0, 1.5}, 2), square_at({1, 0, -1.5}, 2)}));
+  EXPECT_EQ(irradiance_at(landed, {-0.5, 0, 0}), 0);
+  EXPECT_NEAR(irradiance_at(landed, {0.5, 0, 0}), 1, 2e-3);
+  EXPECT_NEAR(power(landed, 0), 2, 0.02);
 }
 
 TEST(FlowIrradianceTest, LightThatGoesAwayFromAPlateDoesNotLand) {
   const TensorField field = constant_field(Matrix3d::Zero());
-  EXPECT_FALSE(flow_irradiance(field, surfaces_of(field), floor_plate(12), sun({0, 0, 1}), {{}, 64, 20000}, {}));
+  EXPECT_FALSE(flow_irradiance(field, surfaces_of(field), plate_at(1.5, 12, 64), sun({0, 0, 1}), {{}, 64, 20000}, {}));
 }
 
 }  // namespace

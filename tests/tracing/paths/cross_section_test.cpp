@@ -6,12 +6,7 @@
 namespace tensorray {
 namespace {
 
-CrossSectionSettings radii(double least, double greatest = 1e300) {
-  CrossSectionSettings settings;
-  settings.min_radius = least;
-  settings.max_radius = greatest;
-  return settings;
-}
+CrossSectionSettings radii(double least, double greatest = 1e300) { return {1, least, greatest}; }
 
 PathPoint point_of(const Vector3d& position, const Vector3d& direction, const Matrix3d& tensor) {
   PathPoint point;
@@ -191,9 +186,7 @@ TEST(CrossSection, TheScaleSetsTheMedianRadius) {
 TEST(CrossSection, RefusesSettingsOutOfRange) {
   EXPECT_THROW(cross_sections({}, radii(0)), std::invalid_argument);
   EXPECT_THROW(cross_sections({}, radii(1, 0.5)), std::invalid_argument);
-  CrossSectionSettings settings = radii(1);
-  settings.scale = 0;
-  EXPECT_THROW(cross_sections({}, settings), std::invalid_argument);
+  EXPECT_THROW(cross_sections({}, CrossSectionSettings{0, 1, 2}), std::invalid_argument) << "a scale of 0";
 }
 
 }  // namespace

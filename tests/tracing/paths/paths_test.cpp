@@ -1,10 +1,7 @@
 #include "tracing/paths/paths.h"
 
-#include <limits>
-
 #include "tests/tracing/packet_support.h"
 #include "tests/tracing/path_support.h"
-#include "tests/tracing/support.h"
 #include "tracing/paths/path_thinning.h"
 #include "tracing/steps/scalar_tracer.h"
 #include "tracing/trace/trace.h"
@@ -19,37 +16,26 @@ PathSettings everything() {
   return settings;
 }
 
-Path trace_one_path(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
-                    const PathSeed& seed, const PathSettings& settings) {
-  const Geometry geometry{Surfaces(surfaces)};
-  return trace_paths(field, geometry, bending, {seed}, settings, Progress()).at(0);
-}
-
-Path trace_one_path(const TensorField& field, const PathSeed& seed, const PathSettings& settings,
-                    const BendingSettings& bending = {}) {
-  return trace_one_path(field, surfaces_of(field), bending, seed, settings);
+Path trace_one_path(const TensorField& field, const PathSeed& seed, const PathSettings& settings = {},
+                    const BendingSettings& bending = {}, Surfaces surfaces = {}) {
+  surfaces.bounds = surfaces_of(field).bounds;
+  return trace_paths(field, Geometry(std::move(surfaces)), bending, {seed}, settings, Progress()).at(0);
 }
 
 PathSeed seed_at(const Vector3d& position, double flexibility = 0.5, const Vector3d& direction = {0, 0, -1}) {
-  PathSeed seed;
-  seed.position = position;
-  seed.direction = direction.normalized();
-  seed.flexibility = flexibility;
-  return seed;
-}
-
-double distance_to_segment(const Vector3d& point, const Vector3d& a, const Vector3d& b) {
-  const double t = std::clamp((point - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
-  return (a + t * (b - a) - point).norm();
+  return {position, direction.normalized(), flexibility};
 }
 
 /// The greatest distance of one of `points` from the polyline `other`.
 double distance(const PathPoints& points, const PathPoints& other) {
   double greatest = 0;
   for (const PathPoint& point : points) {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 1; i < other.size(); ++i)
-      least = std::min(least, distance_to_segment(point.position, other[i - 1].position, other[i].position));
+    double least = INFINITY;
+    for (std::size_t i = 1; i < other.size(); ++i) {
+      const Vector3d &a = other[i - 1].position, side = other[i].position - a, way = point.position - a;
+      const double t = std::clamp(way.dot(side) / side.squaredNorm(), 0.0, 1.0);
+      least = std::min(least, (t * side - way).norm());
+    }
     greatest = std::max(greatest, least);
   }
   return greatest;
@@ -58,7 +44,7 @@ double distance(const PathPoints& points, const PathPoints& other) {
 TEST(Paths, AnIsotropicFieldGivesStraightPathsOfTwoPoints) {
   const TensorField field = constant_field(3 * Matrix3d::Identity());
   const Vector3d V = Vector3d(0.1, -0.2, -1).normalized();
-  const Path path = trace_one_path(field, seed_at({0.1, 0.2, 2}, 0.5, V), {});
+  const Path path = trace_one_path(field, seed_at({0.1, 0.2, 2}, 0.5, V));
   ASSERT_EQ(path.points.size(), 2u);
   EXPECT_NEAR(path.points[0].position.z(), 1, 1e-12);
   EXPECT_NEAR(path.points[1].position.z(), -1, 1e-9);
@@ -81,19 +67,19 @@ TEST(Paths, RecordsTheStepsOfTheReference) {
   RayBatch batch;
   for (int i = 0; i < 40; ++i) batch.add({0.05 * i - 1, 0.3, i % 4 == 0 ? 0.2 : 2.0}, {0, 0, -1}, 0.02 * i);
   const RayBatch starts = batch;
+  const BendingSettings settings;
+  RayBatch plain = batch;
   std::vector<RayRecord> records;
-  trace(field, geometry, {}, batch, &records);
-  RayBatch plain = starts;
-  trace(field, geometry, {}, plain);
+  trace(field, geometry, settings, batch, &records);
+  trace(field, geometry, settings, plain);
   int on_obstacle = 0;
   for (std::size_t i = 0; i < starts.size(); ++i) {
     EXPECT_EQ(plain.position[i], batch.position[i]) << "recorded rays are the same";
-    const BendingSettings settings;
     PathPoints expected;
     Tracer<1> reference(field, geometry, settings);
     const RayEnd end = reference.trace({starts.position[i], starts.direction[i], 0}, starts.flexibility[i], &expected);
     ASSERT_EQ(batch.end[i], end);
-    on_obstacle += end == RayEnd::obstacle ? 1 : 0;
+    on_obstacle += end == RayEnd::obstacle;
     const PathPoints points = points_of(field, records[i]);
     ASSERT_EQ(points.size(), expected.size()) << i;
     for (std::size_t k = 0; k < expected.size(); ++k) {
@@ -169,13 +155,12 @@ TEST(Paths, WithoutTensorsFewerPointsHaveTheSamePositions) {
 
 TEST(Paths, KeepsTheStraightPartsOnRequestAndSeparatesTheFaces) {
   const TensorField field = constant_field(general_tensor());
-  Surfaces surfaces = surfaces_of(field);
+  Surfaces surfaces;
   surfaces.plate = plate_across({0, 0, -1}, 1.5);
   PathSettings settings;
-  const Path inside = trace_one_path(field, surfaces, {}, seed_at({0, 0, 2}), settings);
+  const Path inside = trace_one_path(field, seed_at({0, 0, 2}), settings, {}, surfaces);
   settings.outside = true;
-  const Path whole = trace_one_path(field, surfaces, {}, seed_at({0, 0, 2}), settings);
-
+  const Path whole = trace_one_path(field, seed_at({0, 0, 2}), settings, {}, surfaces);
   EXPECT_EQ(inside.end, RayEnd::plate);
   EXPECT_EQ(inside.backward_end, RayEnd::missed);
   for (const PathPoint& point : inside.points) EXPECT_TRUE(point.in_field);
@@ -195,10 +180,10 @@ TEST(Paths, KeepsTheStraightPartsOnRequestAndSeparatesTheFaces) {
 
 TEST(Paths, ACutLeavesAStraightPieceWithin) {
   const TensorField field = constant_field(general_tensor());
-  Surfaces surfaces = surfaces_of(field);
+  Surfaces surfaces;
   // Two boxes, so that light leaves one and enters the other.
   surfaces.cut = joined({box_between({-2, -2, 0.4}, {2, 2, 0.8}), box_between({-2, -2, -0.8}, {2, 2, -0.4})});
-  const Path path = trace_one_path(field, surfaces, {}, seed_at({0, 0, 2}, 0.1), {});
+  const Path path = trace_one_path(field, seed_at({0, 0, 2}, 0.1), {}, {}, surfaces);
   ASSERT_GT(path.points.size(), 5u);
   EXPECT_NEAR(path.points.front().position.z(), 0.8, 1e-9);
   EXPECT_NEAR(path.points.back().position.z(), -0.8, 1e-9);
@@ -226,9 +211,8 @@ TEST(Paths, OnePathASeedInTheirOrder) {
     EXPECT_EQ(paths[i].end, RayEnd::missed);
     const bool meets = std::abs(seeds[i].position.x()) < 1;
     ASSERT_EQ(paths[i].points.size() >= 2, meets);
-    if (meets) {
-      EXPECT_NEAR(paths[i].points[0].position.x(), seeds[i].position.x(), 1e-12);
-    }
+    if (!meets) continue;
+    EXPECT_NEAR(paths[i].points[0].position.x(), seeds[i].position.x(), 1e-12);
   }
 }
 
@@ -238,12 +222,11 @@ TEST(Paths, StopsWhenCancelledAndRefusesNegativeTolerances) {
   Progress progress;
   progress.cancelled = true;
   EXPECT_THROW(trace_paths(field, geometry, {}, {seed_at({0, 0, 2})}, {}, progress), Cancelled);
-  PathSettings settings;
-  settings.tolerance = -1;
-  EXPECT_THROW(trace_paths(field, geometry, {}, {}, settings, Progress()), std::invalid_argument);
-  settings = {};
-  settings.tensor_tolerance = std::nan("");
-  EXPECT_THROW(trace_paths(field, geometry, {}, {}, settings, Progress()), std::invalid_argument);
+  std::vector<PathSettings> wrong(2);
+  wrong[0].tolerance = -1;
+  wrong[1].tensor_tolerance = NAN;
+  for (const PathSettings& settings : wrong)
+    EXPECT_THROW(trace_paths(field, geometry, {}, {}, settings, Progress()), std::invalid_argument);
 }
 
 class PathThinning : public EveryInstructionSet {};
@@ -256,40 +239,31 @@ struct TracedBothWays {
   JoinedRay ray;
 };
 
-TracedBothWays trace_both(const TensorField& field, const Vector3d& index, double flexibility) {
-  TracedBothWays traced{field, {}, {}, {}};
-  const Geometry geometry(surfaces_of(field));
-  for (const double sign : {1.0, -1.0}) {
-    RayBatch batch;
-    batch.add(field.to_world() * index, sign * Vector3d(0.3, -0.2, 1).normalized(), sign * flexibility);
-    const BendingSettings settings = settings_of(BendingMethod::splitting4, 0.5);  // In packets, with many points.
-    trace(field, geometry, settings, batch, sign > 0 ? &traced.on : &traced.back);
-  }
-  join(field, traced.back[0], traced.on[0], traced.ray);
-  return traced;
-}
-
-TracedBothWays bent_ray(double flexibility = 0.2) {
+TracedBothWays bent_ray(double flexibility) {
   const TensorFunction smooth = smooth_tensor(3);
   const auto strong = [&](const Vector3d& p) { return Matrix3d(smooth(p) + 0.2 * Matrix3d::Identity()); };
-  return trace_both(lattice_field(odd_box(), lattices()[2], strong), {3, 20, 5}, flexibility);
-}
-
-PathPoints all_points(const TracedBothWays& traced) {
-  PathPoints points;
-  for (const JoinedPoint& joined : traced.ray.points) {
-    points.push_back(joined.point);
-    for (std::size_t i = 0; i < joined.steps.count; ++i)
-      points.push_back(path_point(traced.field, traced.ray, joined.steps, i));
+  TracedBothWays traced{lattice_field(odd_box(), lattices()[2], strong), {}, {}, {}};
+  const BendingSettings settings = settings_of(BendingMethod::splitting4, 0.5);  // In packets, with many points.
+  for (const double sign : {1.0, -1.0}) {
+    RayBatch batch;
+    batch.add(traced.field.to_world() * Vector3d(3, 20, 5), sign * Vector3d(0.3, -0.2, 1).normalized(),
+              sign * flexibility);
+    trace(traced.field, Geometry(surfaces_of(traced.field)), settings, batch, sign > 0 ? &traced.on : &traced.back);
   }
-  return points;
+  join(traced.field, traced.back[0], traced.on[0], traced.ray);
+  return traced;
 }
 
 /// The error of each point between two that stay, in the tolerances' units, in double precision.
 TEST_P(PathThinning, KeepsItsTolerances) {
   for (const double flexibility : {0.05, 0.2, 0.8}) {
     const TracedBothWays traced = bent_ray(flexibility);
-    const PathPoints points = all_points(traced);
+    PathPoints points;
+    for (const JoinedPoint& joined : traced.ray.points) {
+      points.push_back(joined.point);
+      for (std::size_t i = 0; i < joined.steps.count; ++i)
+        points.push_back(path_point(traced.field, traced.ray, joined.steps, i));
+    }
     PathSamples samples;
     sample_path(traced.field, traced.ray, true, samples);
     const std::vector<std::size_t> chosen = thinned(samples, 0.05, 0.02);

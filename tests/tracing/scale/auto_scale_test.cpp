@@ -7,17 +7,16 @@
 namespace tensorray {
 namespace {
 
-AutoScale scale_of(const TensorField& field, const Vector3d& direction = {0, 0, -1}) {
+AutoScale scale_of(const TensorField& field, const Progress& progress = Progress()) {
   return choose_scale(field, Geometry(surfaces_of(field)),
-                      silhouette_beam(field.corners(), direction, Vector3d::UnitY()), Progress());
+                      silhouette_beam(field.corners(), -Vector3d::UnitZ(), Vector3d::UnitY()), progress);
 }
 
 /// Of the field and of length. Squares of these lengths, or of their inverses, are beyond single precision.
 TEST(AutoScale, CancelsTheUnits) {
-  const Interpolant interpolants[] = {{}, {Interpolation::cubic, Border::fade}};
-  for (const Interpolant& interpolant : interpolants) {
+  for (const Interpolant& interpolant : {Interpolant{}, Interpolant{Interpolation::cubic, Border::fade}}) {
     const auto scale_with = [&](double size, double strength) {
-      const Eigen::Affine3d placement(Eigen::Scaling(size));
+      const Affine3d placement(Eigen::Scaling(size));
       const auto tensor = [&](const Vector3d& p) { return Matrix3d(strength * linear_tensor(p / size)); };
       return scale_of(TensorField(cube_grid({9, 9, 9}, tensor, placement), interpolant));
     };
@@ -35,11 +34,8 @@ TEST(AutoScale, CancelsTheUnits) {
 /// A lens with x'' = −ω²x along the light, ω² = 0.2 · scale. Light converges to |cos 2ω − ω/2 sin 2ω| of its width on
 /// the plane, at a distance of half a unit behind a depth of 2.
 TEST(AutoScale, AgreesWithTheClosedFormOfALens) {
-  const AutoScale chosen = scale_of(cube_field(17, [](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T.col(2) = Vector3d(p.x(), p.y(), 0);
-    return T;
-  }));
+  const AutoScale chosen = scale_of(cube_field(
+      17, [](const Vector3d& p) -> Matrix3d { return Vector3d(p.x(), p.y(), 0) * Vector3d::UnitZ().transpose(); }));
   const double omega = std::sqrt(0.2 * chosen.scale);
   const double change = -2 * std::log(std::cos(2 * omega) - omega / 2 * std::sin(2 * omega));
   const double shown = change * std::exp(1 - change);
@@ -55,8 +51,7 @@ TEST(AutoScale, SmallStructuresAreSeen) {
   const auto waves = [](double half_width) {
     return scale_of(cube_field(65, [&](const Vector3d& p) {
       Matrix3d T = Matrix3d::Zero();
-      if (std::abs(p.x()) < half_width && std::abs(p.y()) < half_width)
-        T.col(2) = Vector3d(std::sin(20 * p.x()), std::sin(20 * p.y()), 0);
+      if (p.head<2>().cwiseAbs().maxCoeff() < half_width) T.col(2).head<2>() = (20 * p.head<2>()).array().sin();
       return T;
     }));
   };
@@ -77,10 +72,9 @@ TEST(AutoScale, LightThatOnlyTurnsTurnsVisibly) {
 
 TEST(AutoDirection, IsTheOneThatShowsMost) {
   for (int axis = 0; axis < 3; ++axis) {
-    const TensorField field = cube_field(9, [&](const Vector3d& p) {
-      Matrix3d T = Matrix3d::Zero();  // Bends light along one axis only.
-      T((axis + 1) % 3, axis) = std::sin(3 * p[(axis + 1) % 3]);
-      return T;
+    const int next = (axis + 1) % 3;
+    const TensorField field = cube_field(9, [&](const Vector3d& p) -> Matrix3d {  // Bends light along one axis only.
+      return std::sin(3 * p[next]) * Vector3d::Unit(next) * Vector3d::Unit(axis).transpose();
     });
     const AutoDirection chosen = choose_direction(field, Geometry(surfaces_of(field)), Vector3d::UnitZ(), Progress());
     EXPECT_GT(std::abs(chosen.direction[axis]), 0.5);  // Along it, or along a diagonal that has a part of it.
@@ -94,8 +88,8 @@ TEST(AutoDirection, IsTheOneThatShowsMost) {
 /// A plate in plane stress: light along its normal, which is a principal direction, goes straight, and light along its
 /// edges makes a strip.
 TEST(AutoDirection, OfAPlateIsADiagonalThatFillsThePicture) {
-  const TensorGrid grid = dense_grid(Eigen::AlignedBox3i(Eigen::Vector3i::Zero(), Eigen::Vector3i(40, 20, 2)),
-                                     Eigen::Affine3d(Eigen::Scaling(0.1)), [](const Eigen::Vector3i& at) -> Matrix3d {
+  const TensorGrid grid = dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(40, 20, 2)), Affine3d(Eigen::Scaling(0.1)),
+                                     [](const Vector3i& at) -> Matrix3d {
                                        return std::sin(0.3 * at.x()) * Vector3d(1, 0.2, 0).asDiagonal().toDenseMatrix();
                                      });
   const TensorField field(grid, {Interpolation::cubic, Border::extend});
@@ -135,11 +129,9 @@ TEST(AutoScale, FieldsThatTurnNoLightKeepTheirScale) {
 }
 
 TEST(AutoScale, StopsWhenCancelled) {
-  const TensorField field = cube_field(9, linear_tensor);
   Progress progress;
   progress.cancelled = true;
-  const Beam beam = silhouette_beam(field.corners(), {0, 0, -1}, Vector3d::UnitY());
-  EXPECT_THROW(choose_scale(field, Geometry(surfaces_of(field)), beam, progress), Cancelled);
+  EXPECT_THROW(scale_of(cube_field(9, linear_tensor), progress), Cancelled);
 }
 
 }  // namespace

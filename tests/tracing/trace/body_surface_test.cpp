@@ -4,7 +4,9 @@
 #include <functional>
 
 #include "base/constants.h"
+#include "tests/renderer/shapes.h"
 #include "tests/tracing/support.h"
+#include "tests/volumes/grid_support.h"
 #include "tracing/trace/trace.h"
 
 namespace tensorray {
@@ -19,40 +21,38 @@ struct Body {
   TriangleMesh mesh;
 };
 
-/// An outline of points (radius, z), counter-clockwise, turned about the z axis. It is closed, or ends on the axis.
-TriangleMesh turned_mesh(const std::vector<Eigen::Vector2d>& outline, std::uint32_t count) {
+/// A closed outline of points (radius, z), counter-clockwise, turned about the z axis.
+TriangleMesh turned_mesh(const std::vector<Vector2d>& outline, std::uint32_t count) {
   TriangleMesh mesh;
   const auto points = static_cast<std::uint32_t>(outline.size());
-  for (std::uint32_t i = 0; i < count; ++i)
-    for (const Eigen::Vector2d& point : outline)
-      mesh.vertices.emplace_back(point.x() * std::cos(2 * pi * i / count), point.x() * std::sin(2 * pi * i / count),
-                                 point.y());
-  for (std::uint32_t i = 0; i < count; ++i)
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Affine3d turn(Eigen::AngleAxisd(2 * pi * i / count, Vector3d::UnitZ()));
     for (std::uint32_t k = 0; k < points; ++k) {
-      const std::uint32_t a = i * points, b = (i + 1) % count * points, l = (k + 1) % points;
-      if (outline[l].x() > 0) mesh.triangles.push_back({a + k, b + l, a + l});
-      if (outline[k].x() > 0) mesh.triangles.push_back({a + k, b + k, b + l});
+      mesh.vertices.push_back(turn * Vector3d(outline[k].x(), 0, outline[k].y()));
+      const std::uint32_t a = i * points, b = (i + 1) % count * points, next = (k + 1) % points;
+      mesh.triangles.push_back({a + k, b + next, a + next});
+      mesh.triangles.push_back({a + k, b + k, b + next});
     }
+  }
   return mesh;
 }
 
 std::vector<Body> bodies() {
   const Vector3d half(0.7, 0.6, 0.55);
-  const Eigen::Affine3d turn(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()));
+  const Affine3d turn(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()));
   const auto box = [=](const Vector3d& p) { return ((turn.inverse() * p).cwiseAbs() - half).maxCoeff(); };
   const Vector3d on_voxels(0.55, 0.6, across / 2);  // At phase 0, its faces are those of the field's box.
   const auto tube = [](const Vector3d& p) {
     const double radius = p.head<2>().norm();
     return std::max({radius - 0.7, 0.33 - radius, std::abs(p.z()) - 0.61});
   };
-  std::vector<Eigen::Vector2d> half_circle;
-  for (int i = 0; i <= 160; ++i)
-    half_circle.emplace_back(i % 160 == 0 ? 0 : 0.7 * std::sin(pi * i / 160), -0.7 * std::cos(pi * i / 160));
-  return {{"ball", [](const Vector3d& p) { return p.norm() - 0.7; }, turned_mesh(half_circle, 320)},
+  auto ball = std::get<TriangleMesh>(sphere(160).shape);
+  for (Vector3d& vertex : ball.vertices) vertex *= 0.7;
+  return {{"ball", [](const Vector3d& p) { return p.norm() - 0.7; }, ball},
           {"tube", tube, turned_mesh({{0.33, -0.61}, {0.7, -0.61}, {0.7, 0.61}, {0.33, 0.61}}, 1024)},
-          {"box", box, box_mesh({-half, half}, turn)},
+          {"box", box, box_between(-half, half, turn)},
           {"upright box", [=](const Vector3d& p) { return (p.cwiseAbs() - on_voxels).maxCoeff(); },
-           box_mesh({-on_voxels, on_voxels}, Eigen::Affine3d::Identity())}};
+           box_between(-on_voxels, on_voxels)}};
 }
 
 /// Light from below over the whole body, a bit oblique.
@@ -101,18 +101,11 @@ Ray true_ray(const Body& body, const TensorFunction& T, const Ray& start, bool& 
 TensorField body_field(const Body& body, const TensorFunction& T, int voxels, const Vector3d& phase,
                        Interpolation between) {
   const double h = across / voxels;
-  Eigen::Affine3d to_world(Eigen::Translation3d(h * phase) * Eigen::Scaling(h));
+  Affine3d to_world(Eigen::Translation3d(h * phase) * Eigen::Scaling(h));
   const Vector3i last = Vector3i::Constant(static_cast<int>(0.85 / h) + 2);
   TensorGrid grid =
       dense_grid({-last, last}, to_world, [&](const Vector3i& i) { return T(to_world * i.cast<double>()); });
-  for (TensorBlock& block : grid.blocks)
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
-      const Vector3i at = block.origin + TensorBlock::position(offset);
-      if (body.distance(to_world * at.cast<double>()) < 0) continue;
-      block.active.reset(static_cast<std::size_t>(offset));
-      block.values[static_cast<std::size_t>(offset)].setZero();
-    }
-  remove_empty_blocks(grid);
+  clear_voxels(grid.blocks, [&](const Vector3i& at) { return body.distance(to_world * at.cast<double>()) >= 0; });
   grid.surface = body.mesh;
   return TensorField(grid, {between, Border::extend});
 }
@@ -195,7 +188,7 @@ TEST(BodySurface, TheExtentGrowsToWholeVoxels) {
       {{-3.5, 0, -0.5}, {4, 5.9, 0.5}, {-2, 0, -0.5}, {4, 6, 0.5}, 1.5},
       {{1, 1, -0.1}, {2, 2, 0.1}, {0, 0, -0.5}, {4, 4, 0.5}, 0},
   };
-  const Eigen::Affine3d to_world =
+  const Affine3d to_world =
       Eigen::Translation3d(1, -2, 3) * Eigen::AngleAxisd(0.4, Vector3d(3, 1, 2).normalized()) * Eigen::Scaling(0.37);
   for (const Case& each : cases) {
     TensorGrid grid = dense_grid({Vector3i(0, 0, 0), Vector3i(4, 4, 0)}, to_world,
