@@ -26,34 +26,58 @@ Caustic drawn(const FlowMap& map, const std::vector<CausticBand>& bands = {Caust
   return draw_caustic(map, unit_plate(), bands, settings, Progress());
 }
 
-/// The irradiance of each pixel by counting rays. Rows have different phases, so that errors cancel over the rows of a
-/// pixel.
-std::vector<double> counted(const std::function<Vector2d(const Vector2d&)>& landing) {
-  constexpr int columns = 4096, rows = 3600;
-  std::vector<double> light(pixels * pixels);
-  for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < columns; ++x) {
-      const Vector2d at = landing({(x + std::fmod(0.618 * y, 1)) / columns, (y + 0.5) / rows});
-      light[static_cast<std::size_t>(at.y()) * pixels + static_cast<std::size_t>(at.x())] += 1;
+/// Light that lands at x of the start (u, v), and turns at some u; of v, it fills 60 rows of pixels.
+struct FoldingLight {
+  const char* name;
+  double (*x)(double u, double v);
+  std::vector<double> (*turns)(double v);  ///< And the last u, 1.
+
+  Vector2d operator()(const Vector2d& at) const { return {x(at.x(), at.y()), 2 + 60 * at.y()}; }
+};
+
+/// The irradiance in closed form. For each v, the light between two places is the length of the set of u that lands
+/// there, of which x is inverted by bisection between its turns.
+std::vector<double> exact_irradiance(const FoldingLight& light) {
+  std::vector<double> exact(pixels * pixels);
+  constexpr int lines = 60 * 64;  // Of v; 64 for each row of pixels.
+  for (int line = 0; line < lines; ++line) {
+    const double v = (line + 0.5) / lines;
+    double* const row = &exact[static_cast<std::size_t>(2 + line / 64) * pixels];
+    double begin = 0;
+    for (const double end : light.turns(v)) {
+      const bool rises = light.x(end, v) > light.x(begin, v);
+      const auto at = [&](double x) {
+        double a = begin, b = end;
+        for (int i = 0; i < 40; ++i) ((light.x((a + b) / 2, v) < x) == rises ? a : b) = (a + b) / 2;
+        return a;
+      };
+      for (int x = 0; x < pixels; ++x) row[x] += std::abs(at(x + 1) - at(x)) / lines / unit_plate().pixel_area();
+      begin = end;
     }
-  for (double& each : light) each /= columns * rows * unit_plate().pixel_area();
-  return light;
+  }
+  return exact;
 }
 
-Vector2d folded(const Vector2d& at) { return {10.3 + 160 * std::pow(at.x() - 0.5, 2), 5 + 50 * at.y()}; }
-
-/// Two folds that meet in a cusp.
-Vector2d cusped(const Vector2d& at) {
-  const double t = 2 * at.x() - 1;
-  return {32 + 20 * (t * t * t + t * (at.y() - 0.5)), 2 + 60 * at.y()};
-}
-
-TEST(Caustic, FoldsAndCuspsAreTheLightOfManyRays) {
-  for (const auto& landing : {folded, cusped}) {
-    SCOPED_TRACE(landing == folded ? "fold" : "cusp");
-    const std::vector<double> exact = counted(landing);
+TEST(Caustic, FoldsAndCuspsHaveTheirClosedForms) {
+  const FoldingLight fold{"fold", [](double u, double) { return 10.3 + 160 * std::pow(u - 0.5, 2); },
+                          [](double) -> std::vector<double> {
+                            return {0.5, 1};
+                          }};
+  const FoldingLight cusp{"cusp",
+                          [](double u, double v) {
+                            const double t = 2 * u - 1;
+                            return 32 + 20 * (t * t * t + t * (v - 0.5));
+                          },
+                          [](double v) -> std::vector<double> {
+                            if (v >= 0.5) return {1};
+                            const double turn = std::sqrt((0.5 - v) / 3);  // Of t.
+                            return {(1 - turn) / 2, (1 + turn) / 2, 1};
+                          }};
+  for (const FoldingLight& light : {fold, cusp}) {
+    SCOPED_TRACE(light.name);
+    const std::vector<double> exact = exact_irradiance(light);
     const auto error = [&](int count) {
-      const Caustic caustic = drawn(lattice_map(count, 0, 1, landing));
+      const Caustic caustic = drawn(lattice_map(count, 0, 1, light));
       EXPECT_NEAR(power_of(caustic, RayEnd::plate), 1, 1e-6);
       return relative_distance(caustic.irradiance.values, exact);
     };
