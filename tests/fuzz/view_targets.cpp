@@ -52,7 +52,7 @@ bool read_page_message(const std::string& bytes) {
   const Pages::Id id = view().pages().open([mailbox](const PageMessage& message) { mailbox->sender()(message); });
   view().pages().receive(id, bytes);
   view().pages().receive(id, R"({"type": "space", "id": "the last message"})");
-  mailbox->wait([](const Json& json) { return json.value("id", Json()) == "the last message"; });
+  mailbox->wait({{"id", "the last message"}});
   view().pages().close(id);
   const std::vector<Received> all = mailbox->all();
   return std::none_of(all.begin(), all.end(),
