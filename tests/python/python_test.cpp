@@ -44,7 +44,9 @@ TEST(Python, Doors) { run("../doors"); }
 TEST(Python, Shards) { run("shards_test.py"); }
 TEST(Python, Fields) { run("fields_test.py"); }
 TEST(Python, LongCalls) { run("long_calls_test.py"); }
+TEST(Python, Rays) { run("rays_test.py"); }
 TEST(Python, Renders) { run("renders_test.py"); }
+TEST(Python, Package) { run("package_test.py"); }
 
 TEST(Python, Notebooks) {
   if (!has_modules("ipykernel, matplotlib, nbconvert, scipy"))
