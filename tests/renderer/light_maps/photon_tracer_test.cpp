@@ -330,7 +330,7 @@ TEST(AreaPhotonsTest, EverySubsetOfTechniquesHasTheSameMean) {
                                                     {"lamp within", Diffuse{}, 1.3, inner_lamp}}) {
     SCOPED_TRACE(name);
     const BendingPlane plane(0.15, steeper), wrong(-0.15, 1 / steeper);
-    Stage stage(plane, floor, 300, 1024, light);
+    Stage stage(plane, floor, 50, 6144, light);
     const Mean truth = stage.radiance(DirectLight::both, false);
     EXPECT_LT(truth.error(), 0.03 * truth.mean());
     for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material})
@@ -346,7 +346,7 @@ TEST(AreaPhotonsTest, EverySubsetOfTechniquesHasTheSameMean) {
     }
     if (steeper == 1) continue;
     // Photons that bend the wrong way do not add up with rays that bend the right way.
-    stage.photons = Stage(wrong, floor, 300, 1024, light).photons;
+    stage.photons = Stage(wrong, floor, 3000, 64, light).photons;
     const double difference = stage.radiance(DirectLight::both, true).mean() - truth.mean();
     EXPECT_GT(std::abs(difference), 0.15 * truth.mean());
   }
