@@ -43,10 +43,18 @@ TEST_F(Program, ThreadsDoNotChangeTheFilesAndTheSeedDoes) {
   }
 }
 
-TEST_F(Program, InfoTellsWhatMakeMade) {
+TEST_F(Program, FilesGoThroughMakeInfoAndRender) {
   run_well({"make", "vortex", "-o", "vortex.vdb", "--resolution", "16", "--circulation", "3"});
   EXPECT_THAT(json::parse(run_well({"info", "vortex.vdb", "--json"}).out).dump(), HasSubstr("circulation=3"));
   EXPECT_THAT(run_well({"info", "vortex.vdb"}).out, HasSubstr("4096"));
+  // The same field gives the same picture if it is made in memory.
+  const auto rendered = [&](const std::string& field) {
+    write("scene.json", small_scene(field));
+    run_well({"render", "scene.json", "-q"});
+    return pixels("scene.exr");
+  };
+  EXPECT_EQ(rendered(R"({"file": "vortex.vdb"})"),
+            rendered(R"({"generate": {"kind": "vortex", "resolution": 16, "circulation": 3}})"));
 }
 
 TEST_F(Program, AnInterruptLeavesNothingBehind) {

@@ -211,6 +211,37 @@ TEST(FinerBricks, ValuesAreNearlyInterpolatedInRegionsThatAreNoBoxes) {
   EXPECT_LT(greatest, 2e-3);
 }
 
+TEST(FinerBricks, TheErrorIsOfFourthOrderInTheLocalVoxel) {
+  double errors[2][2] = {};  // By resolution, in the refined half and in the other.
+  for (const int fine : {0, 1}) {
+    const int n = 32 << fine;
+    const auto formula = [&](const Vector3d& index) {
+      const double phase = Vector3d(16, 9.6, 6.4).dot(index) / n;
+      return Matrix3d(Matrix3d::NullaryExpr([&](auto row, auto column) {
+        return std::sin(phase + 2.1 * static_cast<double>(row) + 0.9 * static_cast<double>(column));
+      }));
+    };
+    const auto left = [&](const Vector3i& b) { return 8 * b.x() < n / 2; };
+    const AlignedBox3i box(Vector3i::Zero(), Vector3i(n, n / 2, n / 2));
+    const TensorField field(grid_of_levels(box, 2, left, formula), smooth_fade);
+    TensorSampler sampler(field);
+    std::mt19937 random(6);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    for (int i = 0; i < 3000; ++i) {
+      const double u = uniform(random);  // Neither near the faces nor near the coarser bricks.
+      const Vector3d index(n * (u < 0.5 ? 0.1 + 0.6 * u : 0.35 + 0.55 * u), n * (0.2 + uniform(random) / 8),
+                           n * (0.2 + uniform(random) / 8));
+      double& error = errors[fine][u < 0.5 ? 0 : 1];
+      error = std::max(error, (sampler.at(index) - formula(index)).norm());
+    }
+  }
+  for (const int half : {0, 1}) {
+    EXPECT_GT(errors[0][half] / errors[1][half], 12);
+    EXPECT_LT(errors[0][half] / errors[1][half], 24);
+  }
+  EXPECT_LT(errors[0][0], errors[0][1] / 10);
+}
+
 TEST(FinerBricks, LevelsWithoutDetailsChangeNothing) {
   const AlignedBox3i box(Vector3i(0, 0, 0), Vector3i(20, 17, 16));
   TensorGrid grid = unit_voxels(box.min(), box.max(), waves);
