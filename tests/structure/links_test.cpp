@@ -2,7 +2,6 @@
 // that GitHub gives them.
 
 #include <cctype>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -144,36 +143,6 @@ TEST(Links, OfTheInterfacesNameWhatExists) {
         sources += bytes_of(file);
       }
   }
-}
-
-// The scripts in tools/, which may install packages, and must not where one only asks what they do.
-/// A folder for the PATH, with programs that install, build or download, and here only fail.
-class Scripts : public ::testing::Test {
- protected:
-  void SetUp() override {
-    for (const char* name : {"apt-get", "blender", "cmake", "dpkg-query", "ninja", "npm", "pip", "pip3", "sudo"}) {
-      write_bytes(folder_ / name, "#!/bin/sh\necho \"$0 was called\" >&2\nexit 1\n");
-      fs::permissions(folder_ / name, fs::perms::owner_all);
-    }
-  }
-
-  const Temporary folder_{"scripts"};
-};
-
-TEST_F(Scripts, HelpOnlyPrints) {
-  int count = 0;
-  for (const fs::path& script : test::files_of_project()) {  // Those in tools/ that can be run.
-    const bool can_be_run = (fs::status(script).permissions() & fs::perms::owner_exec) != fs::perms::none;
-    if (!can_be_run || fs::relative(script, test::source_folder()).string().rfind("tools/", 0) != 0) continue;
-    ++count;
-    const std::string command = "PATH='" + folder_.string() + "':\"$PATH\" '" + script.string() + "' --help >'" +
-                                (folder_ / "printed").string() + "' 2>&1";
-    EXPECT_EQ(std::system(command.c_str()), 0) << script;
-    const std::string text = bytes_of(folder_ / "printed");
-    EXPECT_NE(text.find(script.filename().string()), std::string::npos) << script << ": " << text;
-    EXPECT_EQ(text.find("was called"), std::string::npos) << script << ": " << text;
-  }
-  EXPECT_GT(count, 10);
 }
 
 }  // namespace
