@@ -243,7 +243,9 @@ std::string rows_of(const std::string& name, const std::string& content) {
   for (int i = 0; i < image.width * image.height; ++i) {
     float rgba[4];
     read_pixels(image, i % image.width, i / image.width, 1, rgba);
-    rows += static_cast<char>(std::lround(255 * rgba[1]));
+    const double grey = 255 * rgba[1];
+    EXPECT_NEAR(grey, std::round(grey), 1e-3);
+    rows += static_cast<char>(std::lround(grey));
     if ((i + 1) % image.width == 0) rows += ' ';
   }
   return rows;

@@ -1,5 +1,6 @@
 #pragma once
-/// Picture files made byte by byte, for features that readers must support but that write_image does not use.
+/// Pictures for tests, and picture files made byte by byte, for features that readers must support but that write_image
+/// does not use.
 
 #include <array>
 #include <cstdint>

@@ -248,7 +248,7 @@ TEST(TextureFileTest, LevelsOfLargeFilesHaveTheirMean) {
     EXPECT_NEAR(texture.lookup({0.4, 0.7}, Vector2d(size / width, size / height).asDiagonal())[0], mean, 2e-3) << size;
 }
 
-/// Without the beginning, which names the file.
+/// What is said of a bad file, without the beginning, which names it.
 std::string error_of(const std::string& name, const std::string& content) {
   const Temporary file(name, content);
   const std::string text = message([&] { texture_of(file); }), beginning = "cannot read " + file.string() + ": ";

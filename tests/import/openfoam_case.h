@@ -62,7 +62,7 @@ class OpenFoamCase {
   /// A face of a cell.
   struct Face {
     std::vector<int> points;  ///< In the order that turns about the normal out of the cell.
-    std::string patch;        ///< If no other cell has it.
+    std::string patch;        ///< If no other cell has it. "procBoundary..." is a processor's, "walls" is a wall.
     int owner = 0;            ///< The cell.
     int neighbour = -1;       ///< Another cell that has it; write_mesh finds it.
   };
@@ -97,7 +97,7 @@ class OpenFoamCase {
     }
     std::size_t start = neighbours.size();
     for (const auto& [patch, count] : patches) {
-      const char* const type = patch == "procBoundary" ? "processor" : patch == "walls" ? "wall" : "patch";
+      const char* const type = patch.rfind("procBoundary", 0) == 0 ? "processor" : patch == "walls" ? "wall" : "patch";
       boundary.push_back(
           fmt::format("{}\n{{\n    type {};\n    nFaces {};\n    startFace {};\n}}", patch, type, count, start));
       start += count;

@@ -52,16 +52,20 @@ class LongCallsTest(unittest.TestCase):
             np.testing.assert_array_equal(ends[i], ends[i % 2])
 
     def test_other_threads_run_meanwhile(self):
+        begun = threading.Event()
+
         def count():
             for _ in range(10):
-                time.sleep(0.01)
+                time.sleep(0.001)
+            begun.wait()
             signal.raise_signal(signal.SIGINT)
 
         field, thread = tr.make("vortex", resolution=24), threading.Thread(target=count)
         with tempfile.TemporaryDirectory() as folder:
             with self.assertRaises(KeyboardInterrupt):
                 thread.start()
-                tr.render(LONG, field=field, outputs=os.path.join(folder, "a.exr"))
+                tr.render(LONG, field=field, outputs=os.path.join(folder, "a.exr"),
+                          progress=lambda *report: begun.set())
             self.assertEqual(os.listdir(folder), [])
         thread.join()
 

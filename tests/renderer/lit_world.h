@@ -1,5 +1,5 @@
 #pragma once
-/// Surfaces with materials and lights, as the shading tests look at them.
+/// Surfaces with materials and lights, a region that bends light, and photons, as the tests of light look at them.
 
 #include <utility>
 

@@ -43,7 +43,7 @@ TEST(Refusals, OfCharts) {
   const Vector3d paint(1, 0, 0);
   const auto red = [&](double) { return paint; };
   const auto lines = [&](const GridLines& wrong) { draw_grid_lines(image, std::vector<PixelCoordinates>(16), wrong); };
-  refused("range", {0, infinite}, [](double high) { round_ticks({0, high}, 5); });
+  refused("range", {1, infinite}, [](double high) { round_ticks({1, high}, 5); });
   refused("range", [] { round_ticks({0, 1, true}, 5); });
   refused("two ticks", [] { round_ticks({0, 1}, 1); });
   refused("R, G, B", [&] { draw_color_bar(grey, {"", {0, 1}, red}); });

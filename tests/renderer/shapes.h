@@ -26,7 +26,8 @@ inline ShadedSurface sphere(int rings) {
   for (int ring = 0; ring <= rings; ++ring)
     for (std::uint32_t i = 0; i < around; ++i) {
       const double polar = pi * ring / rings, turn = 2 * pi * i / around;
-      mesh.vertices.emplace_back(std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar));
+      const double radius = ring % rings == 0 ? 0 : std::sin(polar);  // All corners at a pole are at one place.
+      mesh.vertices.emplace_back(radius * std::cos(turn), radius * std::sin(turn), std::cos(polar));
       normals.push_back(mesh.vertices.back().cast<float>());
     }
   for (std::uint32_t ring = 0; ring < static_cast<std::uint32_t>(rings); ++ring)
@@ -50,8 +51,14 @@ inline double volume(const TriangleMesh& mesh) {
 
 /// Distance at which a straight ray enters a box about the origin: 0 if it starts inside, infinite if it misses it.
 inline double box_entry(const Vector3d& half_size, const Vector3d& origin, const Vector3d& direction) {
-  const auto [enters, leaves] = section_in({-half_size, half_size}, origin, direction);
-  return leaves > std::max(enters, 0.0) ? std::max(enters, 0.0) : INFINITY;
+  double enters = 0, leaves = INFINITY;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = (-half_size[axis] - origin[axis]) / direction[axis];
+    const double b = (half_size[axis] - origin[axis]) / direction[axis];
+    enters = std::max(enters, std::min(a, b));
+    leaves = std::min(leaves, std::max(a, b));
+  }
+  return leaves > enters ? enters : INFINITY;
 }
 
 /// Lambert's formula (Schröder and Hanrahan 1993, "On the Form Factor Between Two Polygons"): the irradiance from a

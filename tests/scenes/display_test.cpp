@@ -277,7 +277,7 @@ TEST(Exposure, UndisturbedLightIsLightGreyAndBrightLightIsBelowWhite) {
     EXPECT_NEAR(shown.pixels[300 * i], srgb(1 - std::exp(-light[i])), 1e-3) << light[i];
 }
 
-TEST(Exposure, IsChosenWhereLightIsDarkOrMuchIsBright) {
+TEST(Exposure, IsTheScenesOrIsChosenWhereLightIsDarkOrMuchIsBright) {
   const Scene scene = scene_shown(Json::object());
   EXPECT_EQ(display_exposure(scene, light_of({0, 0, 0})), 0);
   EXPECT_EQ(display_exposure(scene, light_of({0, 0.5f, 1})), 0);

@@ -183,7 +183,9 @@ TEST_F(ReadScene, WrongTypesSayWhatIsExpectedAndFound) {
   refuses("must be a number other than 0, or \"auto\", but is \"x\"", {"field.scale=x"});
   refuses("a list of 3 numbers", {"light.direction=[0,1]"});
   refuses("a list of 3 numbers", {"light.direction=[0,1,null]"});
-  // Of lenses.
+}
+
+TEST_F(ReadScene, WrongLensesAreRefused) {
   refuses("\"checkerboard\", \"grid\", \"color_wheel\"", {"integrator.image=chekerboard"});
   refuses("a number, or a list of them", {"integrator.image_plane.depth=[]"});
   refuses("a number, or a list of them", {"integrator.image_plane.depth=[0,\"a\"]"});

@@ -40,7 +40,7 @@ TEST_F(Scripts, HelpOnlyPrints) {
   EXPECT_GT(count, 10);
 }
 
-/// So do pages.
+/// Scripts and pages name only parts of tools/setup that there are.
 TEST_F(Scripts, NamePartsOfSetupThatThereAre) {
   const std::string setup = bytes_of(test::source_folder() / "tools" / "setup");
   const std::size_t begin = setup.find("case $part in\n");

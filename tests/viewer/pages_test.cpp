@@ -35,7 +35,7 @@ class PagesTest : public test::ViewTest {
 };
 
 TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
-  const test::Received last = page_.final_picture(1, test::small_scene());
+  const test::Received last = page_.picture_of_scene(1, test::small_scene());
   const Json first = page_.wait("picture", 1).json;
   EXPECT_EQ(first.at("stage"), 0);
   EXPECT_LT(first.at("width"), 64);
@@ -59,7 +59,7 @@ TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
 /// Of light that is traced, the finished picture is there at once.
 TEST_F(PagesTest, ATurnedAnalyserHasNoCoarsePicture) {
   const auto first_picture = [&](int id, const Json& scene) {
-    page_.final_picture(id, scene);
+    page_.picture_of_scene(id, scene);
     return page_.wait("picture", id).json;
   };
   scene_["integrator"] = {{"type", "polariscope"}};
@@ -97,7 +97,7 @@ TEST_F(PagesTest, TheNewestSceneWins) {
 }
 
 TEST_F(PagesTest, TellsAboutAPixelAndTheLightThere) {
-  page_.final_picture(1, test::small_scene());
+  page_.picture_of_scene(1, test::small_scene());
   // The spectrum comes with a further picture, which is made while nothing else is to be done.
   page_.wait("details", 1);
   const Json answer = page_.answer("look", {{"type", "look"}, {"id", 2}, {"x", 0.3}, {"y", 0.4}}).json;
@@ -118,7 +118,7 @@ TEST_F(PagesTest, APixelHasTheBandsOfItsPicture) {
   scene_["camera"] = {{"resolution", {16, 16}}};
   for (const int count : {3, 12}) {
     scene_["light"]["wavelengths"]["count"] = count;
-    page_.final_picture(count, scene_);
+    page_.picture_of_scene(count, scene_);
     const Json look{{"type", "look"}, {"id", 100 + count}, {"x", 0}, {"y", 0}};
     const Json spectrum = page_.answer("look", look).json.at("spectrum");
     EXPECT_EQ(spectrum.at("nm").size(), 6u);
@@ -150,13 +150,13 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
   field["field"] = {{"file", "/dev/zero"}};
   int id = 10;
   for (const Json& scene : {foreign, huge, unknown, field})
-    EXPECT_THAT(page_.error(test::scene_message(++id, scene)), Not(HasSubstr("\n")));
+    EXPECT_THAT(page_.refusal_of(test::scene_message(++id, scene)), Not(HasSubstr("\n")));
   // The fuzzer `page` sends others.
   const std::vector<std::string> wrong{"{", R"({"type":"shutdown"})", R"({"type":"scene","scene":[]})",
                                        R"({"type":"export","file":"../x"})", std::string(100000, '[')};
   for (const std::string& text : wrong) page_.send_text(text);
   for (int i = 0; i < 1000; ++i) page_.send({{"type", "look"}, {"id", 1000 + i}, {"x", 1e308}, {"y", -1e308}});
-  page_.final_picture(20, test::small_scene());
+  page_.picture_of_scene(20, test::small_scene());
   std::size_t errors = 0;
   for (const test::Received& message : page_.all()) errors += message.json.at("type") == "error" ? 1 : 0;
   EXPECT_GE(errors, 4 + wrong.size());
@@ -165,7 +165,7 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
 /// A page that comes while another one looks at another field.
 TEST_F(PagesTest, AllPagesBeginWithTheSameField) {
   scene_["field"]["generate"]["resolution"] = 7;
-  page_.final_picture(1, scene_);
+  page_.picture_of_scene(1, scene_);
   other_.open(pages_);
   EXPECT_EQ(other_.hello().at("field").at("voxels")[0], 12);
 }
@@ -187,9 +187,9 @@ TEST_F(PagesTest, AnImportHasTheNameOfItsFile) {
   Json wrong = scene, other = scene;
   wrong["light"]["photons"] = -1;
   other["field"]["file"] = "other.vdb";
-  EXPECT_THAT(page.error(test::scene_message(1, wrong)), HasSubstr("part.vtu"));
-  EXPECT_THAT(page.error(test::scene_message(4, other)), HasSubstr("this view shows"));
-  page.final_picture(2, scene);
+  EXPECT_THAT(page.refusal_of(test::scene_message(1, wrong)), HasSubstr("part.vtu"));
+  EXPECT_THAT(page.refusal_of(test::scene_message(4, other)), HasSubstr("this view shows"));
+  page.picture_of_scene(2, scene);
   EXPECT_EQ(page.answer("file", {{"type", "export"}, {"id", 3}, {"file", "png"}}).json.at("name"), "part.png");
   for (const test::Received& message : page.all()) EXPECT_THAT(message.json.dump(), Not(HasSubstr("made.vdb")));
 }
@@ -214,11 +214,11 @@ TEST_F(PagesTest, PagesDoNotDisturbEachOther) {
   other_.open(pages_);
   scene_["field"]["generate"]["kind"] = "two_point_load";
   other_.send(test::scene_message(1, scene_));
-  const test::Received mine = page_.final_picture(1, test::small_scene()), theirs = other_.final_picture(1);
+  const test::Received mine = page_.picture_of_scene(1, test::small_scene()), theirs = other_.final_picture(1);
   EXPECT_NE(mine.bytes, theirs.bytes);
-  EXPECT_EQ(page_.final_picture(2, test::small_scene()).bytes, mine.bytes);
+  EXPECT_EQ(page_.picture_of_scene(2, test::small_scene()).bytes, mine.bytes);
   other_.close();
-  page_.final_picture(3, test::small_scene());
+  page_.picture_of_scene(3, test::small_scene());
 }
 
 // The page of the live view in a real browser, with a real server: tools/viewer/page/test/page_test.mjs.

@@ -92,10 +92,11 @@ class Mailbox {
 
   /// The first message that has these members; it waits for it.
   Received wait(const Json& members) {
+    const auto items = members.items();
     const auto has_them = [&](const Received& message) {
-      Json changed = message.json;
-      changed.update(members);
-      return changed == message.json;
+      return std::all_of(items.begin(), items.end(), [&](const auto& member) {
+        return message.json.value(member.key(), Json()) == member.value();
+      });
     };
     std::unique_lock<std::mutex> lock(mutex_);
     auto found = messages_.end();
@@ -119,13 +120,13 @@ class Mailbox {
   void send_text(const std::string& text) { pages_->receive(page_, text); }
   void send(const Json& message) { send_text(message.dump()); }
 
-  /// Sends a message and waits for the answer of this type.
+  // Each of these sends first, and waits for the answer: of a type, an error's text, a scene's picture.
   Received answer(const std::string& type, const Json& message) {
     send(message);
     return wait(type, message.at("id"));
   }
-  std::string error(const Json& message) { return answer("error", message).json.at("message"); }
-  Received final_picture(int id, const Json& scene) {
+  std::string refusal_of(const Json& message) { return answer("error", message).json.at("message"); }
+  Received picture_of_scene(int id, const Json& scene) {
     send(scene_message(id, scene));
     return final_picture(id);
   }

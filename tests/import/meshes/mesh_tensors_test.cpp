@@ -148,7 +148,8 @@ TEST(ComponentArrays, ErrorsNameTheArrayAndListTheOthers) {
 }
 
 // Meshes in a plane become slabs of one voxel.
-/// The points of cells of a type that are a square, by their places in 3 x 3, row by row. Of two, one is clockwise.
+/// The cells of each type that fill a square: their points, numbered row by row in a grid of 3 x 3. Of two cells, one
+/// is clockwise.
 const std::map<int, std::vector<std::vector<int>>> cells_of_square{
     {VTK_QUAD, {{0, 2, 8, 6}}},
     {VTK_TRIANGLE, {{0, 2, 8}, {0, 6, 8}}},
@@ -185,12 +186,17 @@ Matrix3d plane_tensor(const Vector3d& p) {
 }
 
 void expect_everywhere(const TensorGrid& grid, const std::function<Matrix3d(const Vector3d&)>& tensor) {
-  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& value) { EXPECT_LT((value - tensor(p)).norm(), 1e-5); });
+  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& value) {
+    EXPECT_LT((value - tensor(p)).norm(), 1e-5) << p.transpose();
+  });
 }
 
 class FlatMesh : public testing::Test {
  protected:
-  void write(vtkDataSet& mesh) const { write_xml(mesh, folder_ / "a.xml"); }
+  void write(vtkDataSet& mesh) const {
+    std::filesystem::remove(folder_ / "a.xml");
+    write_xml(mesh, folder_ / "a.xml");
+  }
   Imported read() const { return imported(folder_ / "a.xml", settings_); }
 
   /// Expects an error of the user's with the file and these words.
@@ -291,10 +297,11 @@ TEST_F(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
   write(*tilted);
   refuses("surface in space");
   settings_.thickness = 1;
-  write(*bar(0, 3));
-  refuses("--thickness");
-  write(*image());
-  refuses("--thickness");
+  for (const vtkSmartPointer<vtkDataSet>& solid : {vtkSmartPointer<vtkDataSet>(bar(0, 3)), {image()}}) {
+    SCOPED_TRACE(solid->GetClassName());
+    write(*solid);
+    refuses("--thickness");
+  }
 }
 
 /// Images keep their voxels, and are fields of a plane as meshes are.

@@ -1,5 +1,7 @@
 // Cells and points without data leave a hole of their own size; all kinds of data sets treat ghosts alike.
 
+#include <array>
+
 #include <vtkIntArray.h>
 #include <vtkUnsignedCharArray.h>
 
@@ -25,10 +27,10 @@ vtkDataSetAttributes& data_of(vtkDataSet& set, bool of_cells) {
   return *set.GetAttributes(of_cells ? vtkDataObject::CELL : vtkDataObject::POINT);
 }
 
+bool nowhere(double) { return false; }
+
 /// Adds an array of ones, except for where `missing` tells that there is no number.
-void add_ones(
-    vtkDataSet& mesh, const char* name, int components, bool of_cells,
-    bool (*missing)(double x) = [](double) { return false; }) {
+void add_ones(vtkDataSet& mesh, const char* name, int components, bool of_cells, bool (*missing)(double x) = nowhere) {
   vtkNew<vtkDoubleArray> array;
   array->SetName(name);
   array->SetNumberOfComponents(components);

@@ -64,7 +64,7 @@ TEST_F(VtkCollection, OfATimeSeriesTheLastTimeWithAllItsParts) {
   write_bytes(folder_ / "blocks.pvd", series(R"(<DataSet timestep="-2" file="early.vtu"/>
                                                <DataSet timestep="-1" file="late.vtm"/>)"));
   for (const char* name : {"parts.pvd", "blocks.pvd"}) {
-    EXPECT_EQ(time_steps(folder_ / name), 2);
+    EXPECT_EQ(time_steps(folder_ / name), 2) << name;
     for (const auto& [step, cells] : {std::pair(std::optional<int>(), 5), {0, 1}, {1, 5}})
       EXPECT_EQ(read_vtk_source(folder_ / name, step)->GetNumberOfCells(), cells) << name;
     EXPECT_THROW(read_vtk_source(folder_ / name, 2), std::invalid_argument) << name;

@@ -224,7 +224,7 @@ TEST_F(VtkDamage, FilesThatAreCutOff) {
                 "")
           << ending << part;
   }
-  // New ones: the XML writer leaves keys in arrays, which a legacy file then has last.
+  // Fresh data sets: the XML writer leaves keys in arrays, which a legacy file would have after the tensors.
   for (const auto& [ending, written] : data_sets()) {
     written->GetCellData()->Initialize();  // The tensors become the last array of the file.
     for (const bool binary : {false, true}) {

@@ -84,11 +84,12 @@ TEST(VtkSourceTest, OpenFoamCase) {
   const TemporaryFolder folder;
   OpenFoamCase::write(folder);
   write_bytes(folder / "case.foam", "");
-  // Of the first values, the components in this order of those of the file.
+  // Component c of the first `count` values must be the component order[c] of the file.
   const auto expect_order = [](vtkDataArray& array, int count, const Ints& order) {
     for (int i = 0; i < count; ++i)
       for (std::size_t c = 0; c < order.size(); ++c)
-        EXPECT_EQ(array.GetComponent(i, static_cast<int>(c)), OpenFoamCase::value(i, order[c], 1)) << c;
+        EXPECT_EQ(array.GetComponent(i, static_cast<int>(c)), OpenFoamCase::value(i, order[c], 1))
+            << array.GetName() << " " << i << " " << c;
   };
   for (const std::filesystem::path& path : {folder.path(), folder / "case.foam", folder / "system" / "controlDict"}) {
     const auto read = read_vtk_source(path);
@@ -306,9 +307,11 @@ void expect_velocity(vtkDataSet& data, int step, bool of_cells = false) {
   vtkDataArray* const read =
       data.GetAttributes(of_cells ? vtkDataObject::CELL : vtkDataObject::POINT)->GetArray("Velocity");
   ASSERT_TRUE(read && read->GetNumberOfComponents() == 3);
+  ASSERT_EQ(read->GetNumberOfTuples(), of_cells ? data.GetNumberOfCells() : data.GetNumberOfPoints());
   for (vtkIdType i = 0; i < read->GetNumberOfTuples(); ++i)
     EXPECT_EQ(Vector3d(read->GetTuple3(i)),
-              velocity(of_cells ? mesh_fixtures::middle_of(*data.GetCell(i)) : Vector3d(data.GetPoint(i)), step));
+              velocity(of_cells ? mesh_fixtures::middle_of(*data.GetCell(i)) : Vector3d(data.GetPoint(i)), step))
+        << (of_cells ? "cell " : "point ") << i;
 }
 
 TEST(Cgns, ZonesAreOneMeshInBothFormatsWithValuesAtPointsAndCells) {

@@ -38,11 +38,11 @@ LensMap make_map(const TensorField& field, const Plate& from, const Plate& to, c
   return LensMap(field, surfaces_of(field), settings, from, to, direction);
 }
 
-/// Follows light, which must end so.
+/// The landing of light, which must have this end.
 LensLanding land(const LensMap& map, const Vector2d& start, double flexibility, RayEnd end = RayEnd::plate) {
   LensLanding landing;
   map.trace({start}, {flexibility}, &landing);
-  EXPECT_EQ(landing.end, end);
+  EXPECT_EQ(landing.end, end) << start.transpose() << ", s " << flexibility;
   return landing;
 }
 

@@ -90,8 +90,10 @@ TEST(FieldRegionTest, WaysStartOnSurfaces) {
       const Vector3d start = stage.start(*hit, hit->lifted_position, 1);
       if (!std::isinf(region.entry(start, direction))) ways.push_back(ray_of(start, direction));
     }
+    EXPECT_GT(ways.size(), 50u);
     region.trace_radiance(ways);
     for (const BentRay& way : ways) {
+      SCOPED_TRACE(testing::Message() << height << ", way " << &way - ways.data());
       ASSERT_TRUE(way.arrives);
       EXPECT_GT(way.position.z(), height + 1e-3);
       EXPECT_TRUE(!way.on_surface || std::abs(way.position.z() - 0.4) < 1e-5);

@@ -91,6 +91,14 @@ TEST_F(ImportErrors, NamesOfFilesAreNoNumbers) {
   expect_error("missing.json", {"render", "-o", "a.png", "missing.json", "-q"});  // Not as another picture.
 }
 
+TEST_F(ImportErrors, AFullDiskLeavesWhatWasThere) {
+  write("array.npy", array());
+  write("old.vdb", " BDV, which was there before");
+  expect_one_line(run({"import", "array.npy", "-q", "-o", "old.vdb"}, "ulimit -f 8; exec"), "", 1);
+  EXPECT_EQ(contents("old.vdb"), " BDV, which was there before");
+  EXPECT_THAT(files(), ElementsAre("array.npy", "old.vdb"));
+}
+
 TEST_F(ImportErrors, DataThatTheInputNamesAreNotReplaced) {
   const std::string numbers(9 * 8 * sizeof(float), 1);
   write("data.vdb", numbers);

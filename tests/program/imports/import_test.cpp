@@ -213,5 +213,20 @@ TEST_F(Grids, FluenceIsAFogVolumeInTheFieldsVoxelsOfEachBandIfAsked) {
               ElementsAre(Key("fluence"), Key("fluence_blue"), Key("fluence_green"), Key("fluence_red")));
 }
 
+TEST_F(Grids, PythonReadsThem) {
+  run_well({"make", "vortex", "-o", "t.vdb", "--resolution", "9"});
+  run_well({"derive", "t.vdb", "--invariant", "vorticity", "-o", "i.vdb"});
+  write("print.py", R"(
+try: import pyopenvdb as vdb
+except ImportError: import openvdb as vdb
+for file in ('t.vdb', 'i.vdb'):
+  grids, metadata = vdb.readAll(file)
+  print(*sorted(g.name for g in grids), grids[0].activeVoxelCount())
+)");
+  const Outcome printed = run_shell("/usr/bin/python3 print.py");
+  if (printed.status != 0) GTEST_SKIP() << "python3 has no OpenVDB (python3-openvdb)";
+  EXPECT_EQ(printed.out, "vortex_row0 vortex_row1 vortex_row2 729\nvorticity 729\n");
+}
+
 }  // namespace
 }  // namespace tensorray

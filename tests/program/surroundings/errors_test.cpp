@@ -101,7 +101,8 @@ TEST_F(Errors, AFullDiskLeavesTheOldPictureAndNoHalfOne) {
   expect_one_line(run({"make", "helix", "-o", "/dev/full", "--resolution", "24"}), "/dev/full", 1);
   expect_one_line(run({"render", "scene.json", "-q", "-o", "complete.png", "--stats", "/dev/full"}), "/dev/full", 1);
   // A render that cannot write its pictures keeps its work.
-  EXPECT_THAT(files(), testing::Each(testing::MatchesRegex("scene.json|(a|full|complete)[.][a-z]+([.]checkpoint)?")));
+  EXPECT_THAT(files(), testing::Each(testing::MatchesRegex(
+                           "scene.json|(a[.](png|exr|vdb|vtp|jpg)|full[.]png|complete[.]png)([.]checkpoint)?")));
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
 }
 

@@ -145,8 +145,8 @@ TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
   run_well(make_shard(1, {}));
   run_well(make_shard(2, {"--light", shard(1)}));
   run_well(make_shard(3, {}));
-  EXPECT_THAT(contents(shard(1)), HasSubstr(light_name));
-  EXPECT_THAT(contents(shard(2)), Not(HasSubstr(light_name)));
+  EXPECT_NE(contents(shard(1)).find(light_name), std::string::npos);
+  EXPECT_EQ(contents(shard(2)).find(light_name), std::string::npos);
   run_well(merge({shard(3), shard(2), shard(1)}));
   expect_same("a");
   expect_error("of another render", make_shard(3, {"--light", shard(1), "--seed", "7"}));

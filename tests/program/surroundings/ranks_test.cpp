@@ -114,6 +114,7 @@ TEST_F(RanksProgram, AKilledRankEndsTheJobWhichContinuesToTheSameFiles) {
     kill(*process, SIGKILL);
     const Outcome outcome = wait_for(job);
     EXPECT_NE(outcome.status, 0);  // The other does not wait for it.
+    while (process_of(0) || process_of(1)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     EXPECT_THAT(outcome.error, HasSubstr(fmt::format("rank {}", rank)));
     EXPECT_TRUE(has("a.png.checkpoint"));
     EXPECT_FALSE(is_equal("a.exr", "one.exr"));

@@ -261,7 +261,8 @@ TEST_F(PictureTest, IsCancelledWithinATile) {
 }
 
 TEST_F(PictureTest, AdaptiveSamplingKeepsTheMeanAndWorksWhereItIsNoisy) {
-  settings.max_samples = 128;  // 16 of each pass.
+  settings.min_samples = settings.pass_samples = 16;
+  settings.max_samples = 128;
   const SurfacePicture full = render_surfaces(world.scene, camera(32), settings);
   settings.noise_threshold = 0.06;
   settings.seed = 1;

@@ -8,23 +8,29 @@ namespace tensorray {
 namespace {
 
 /// Compares entries of the published table that lie between the control points.
-/// @param last  The number of the last entry. @param colors  Numbers of entries, and their values from 0 to 255.
-void expect_published(Colormap map, int last, double tolerance, const std::vector<std::pair<int, Vector3d>>& colors) {
+/// @param name  Of the map. @param last  The number of the last entry. @param colors  Numbers of entries, and their
+/// values from 0 to 255.
+void expect_published(const char* name, Colormap map, int last, double tolerance,
+                      const std::vector<std::pair<int, Vector3d>>& colors) {
   for (const auto& [entry, color] : colors)
     EXPECT_LE((255 * colormap_srgb(map, 1.0 * entry / last) - color).cwiseAbs().maxCoeff(), tolerance)
-        << "number " << static_cast<int>(map) << " of the enumeration, at " << entry;
+        << name << " at " << entry;
 }
 
 TEST(ColormapTest, AgreesWithThePublishedTables) {
-  expect_published(Colormap::viridis, 255, 1.5,
+  expect_published("viridis", Colormap::viridis, 255, 1.5,
                    {{3, {69, 5, 89}}, {42, {68, 57, 131}}, {128, {33, 145, 140}}, {213, {144, 215, 67}}});
-  expect_published(Colormap::magma, 255, 1.5, {{42, {44, 17, 95}}, {128, {183, 55, 121}}, {252, {252, 247, 185}}});
-  expect_published(Colormap::inferno, 255, 1.5, {{42, {50, 10, 94}}, {213, {251, 182, 26}}, {252, {248, 251, 154}}});
-  expect_published(Colormap::plasma, 255, 1.5, {{3, {22, 7, 138}}, {128, {204, 71, 120}}, {213, {253, 180, 47}}});
-  expect_published(Colormap::cividis, 255, 3.5, {{42, {42, 63, 109}}, {128, {125, 124, 120}}, {213, {210, 192, 96}}});
-  expect_published(Colormap::twilight, 509, 1.5, {{84, {124, 162, 194}}, {426, {198, 139, 110}}});
-  expect_published(Colormap::twilight, 509, 2.5, {{255, {47, 20, 54}}});  // A corner.
-  expect_published(Colormap::cool_warm, 32, 1e-9,
+  expect_published("magma", Colormap::magma, 255, 1.5,
+                   {{42, {44, 17, 95}}, {128, {183, 55, 121}}, {252, {252, 247, 185}}});
+  expect_published("inferno", Colormap::inferno, 255, 1.5,
+                   {{42, {50, 10, 94}}, {213, {251, 182, 26}}, {252, {248, 251, 154}}});
+  expect_published("plasma", Colormap::plasma, 255, 1.5,
+                   {{3, {22, 7, 138}}, {128, {204, 71, 120}}, {213, {253, 180, 47}}});
+  expect_published("cividis", Colormap::cividis, 255, 3.5,
+                   {{42, {42, 63, 109}}, {128, {125, 124, 120}}, {213, {210, 192, 96}}});
+  expect_published("twilight", Colormap::twilight, 509, 1.5, {{84, {124, 162, 194}}, {426, {198, 139, 110}}});
+  expect_published("twilight", Colormap::twilight, 509, 2.5, {{255, {47, 20, 54}}});  // A corner.
+  expect_published("cool_warm", Colormap::cool_warm, 32, 1e-9,
                    {{0, {59, 76, 192}}, {16, {221, 221, 221}}, {24, {244, 154, 123}}, {32, {180, 4, 38}}});
 }
 

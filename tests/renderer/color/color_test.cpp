@@ -73,8 +73,10 @@ const std::string aces_role = "  aces_interchange: aces\n";
 const std::string xyz_role = "  cie_xyz_d65_interchange: xyz\n";
 
 TEST_F(ColorTest, HighlightsAreSoftUnlessAViewIsNamed) {
-  const ColorManagement color({}), rec1886({"", "Rec.1886", ""});
-  for (const ColorManagement& each : {color, rec1886}) EXPECT_EQ(each.view(), soft_highlights_view);
+  const ColorManagement color({}), rec1886({"", "Rec.1886", soft_highlights_view});
+  for (const char* display : {"sRGB", "Rec.1886"})
+    EXPECT_EQ(ColorManagement({"", display, ""}).view(), soft_highlights_view);
+  EXPECT_EQ(ColorManagement({"", "", "Raw"}).view(), "Raw");
   for (const float value : {-30.0f, -1.0f, 0.0f, 1e-3f, 0.18f, 1.0f, 3.0f, 20.0f, 1e4f}) {
     const double shown = 1 - std::exp(-std::max(value, 0.0f));
     EXPECT_NEAR(displayed_grey(color, value), srgb(shown), 1e-3) << value;
@@ -212,6 +214,7 @@ TEST_F(ColorTest, EitherInterchangeRoleLeadsToTheWorkingSpace) {
     const Matrix3d matrix = color_of(config_text(linear_role + roles)).xyz_to_working();
     const Matrix3d expected = roles.empty() ? xyz_to_rec709 : Matrix3d(rec709_to_acescg * xyz_to_rec709);
     EXPECT_TRUE(matrix.isApprox(expected, 1e-4)) << roles << matrix << "\n\n" << expected;
+    EXPECT_TRUE((matrix * Vector3d(0.3127, 0.3290, 0.3583) / 0.3290).isApprox(Vector3d::Ones(), 1e-4)) << roles;
   }
 }
 

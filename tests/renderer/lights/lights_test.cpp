@@ -18,7 +18,7 @@ namespace {
 
 const AlignedBox3d unit_scene(Vector3d(-1, -1, -1), Vector3d(1, 1, 1));
 
-/// A light of one band, 2 by 1.2, above the origin and tilted; it emits downward()s.
+/// A light of one band, 2 by 1.2, above the origin and tilted; it emits downwards.
 AreaLight lamp(float radiance) {
   const Vector3d right(0.8, 0, -0.6), up(0, -1, 0);
   return {rectangle_mesh({0.3, -0.2, 1.5}, right, up, {2, 1.2}), {radiance}};

@@ -310,23 +310,40 @@ TEST(ReadMeshTest, BadFilesAreOneClearLine) {
   EXPECT_THAT(message([] { read_mesh(::testing::TempDir()); }), HasSubstr("folder"));
 }
 
-TEST(MeshNormalsTest, AreThoseOfTheFileOrMadeByAngle) {
-  const ShadedSurface unit = sphere(24);
-  TriangleMesh large = std::get<TriangleMesh>(unit.shape);
-  for (Vector3d& vertex : large.vertices) vertex *= 2;
-  for (const bool in_file : {true, false}) {
-    const Temporary file("sphere.ply");
-    write_mesh(file, large, {in_file ? &unit.normals : nullptr});
-    const std::optional<double> angle = in_file ? std::nullopt : std::optional(0.5);
-    const MeshWithNormals mesh = read_mesh_with_normals(file, angle);
-    ASSERT_EQ(mesh.normals.size(), mesh.mesh.vertices.size());
-    for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
-      const Vector3d P = mesh.mesh.vertices[i];
-      if (std::abs(P.z()) > 1.98) continue;  // The poles, where vertices nearly coincide.
-      EXPECT_LT((mesh.normals[i].cast<double>() - P / 2).norm(), in_file ? 1e-5 : 0.01) << P.transpose();
+/// A sphere of radius 2 about the origin, open at its ends.
+std::string sphere_ply(bool normals) {
+  constexpr int rows = 24, columns = 48;
+  std::string header = ply_header("ascii", rows * columns, (rows - 1) * columns), content, faces;
+  if (normals) header.insert(header.find("element face"), "property float nx\nproperty float ny\nproperty float nz\n");
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < columns; ++j) {
+      const double theta = pi * (i + 0.5) / rows, phi = 2 * pi * j / columns;
+      for (int repeat = 0; repeat < (normals ? 2 : 1); ++repeat)
+        for (const double x : {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)})
+          content += std::to_string((repeat == 0 ? 2 : 1) * x) + " ";
+      content += "\n";
+      const int next = (j + 1) % columns;
+      if (i + 1 < rows)
+        faces += "4 " + std::to_string(i * columns + j) + " " + std::to_string((i + 1) * columns + j) + " " +
+                 std::to_string((i + 1) * columns + next) + " " + std::to_string(i * columns + next) + "\n";
     }
-    EXPECT_EQ(read_mesh_with_normals(file, std::nullopt).normals.empty(), !in_file);
+  return header + content + faces;
+}
+
+TEST(MeshNormalsTest, AreThoseOfTheFileOrMadeByAngle) {
+  for (const bool in_file : {true, false}) {
+    const Temporary file("sphere.ply", sphere_ply(in_file));
+    const std::optional<double> angle = in_file ? std::nullopt : std::optional(0.5);
+    const MeshWithNormals sphere = read_mesh_with_normals(file, angle);
+    ASSERT_EQ(sphere.normals.size(), 24u * 48u);
+    for (std::size_t i = 0; i < sphere.normals.size(); ++i) {
+      const Vector3d P = sphere.mesh.vertices[i];
+      if (std::abs(P.z()) > 1.98) continue;  // The rims of the open ends.
+      EXPECT_LT((sphere.normals[i].cast<double>() - P / 2).norm(), in_file ? 1e-5 : 0.01) << P.transpose();
+    }
   }
+  const Temporary flat("flat.ply", sphere_ply(false));
+  EXPECT_TRUE(read_mesh_with_normals(flat, std::nullopt).normals.empty());
 }
 
 TEST(MeshNormalsTest, OfACubeDependOnTheAngle) {

@@ -137,7 +137,7 @@ TEST_F(FilmScene, MeshesHavePictures) {
   expect_error(2, "\"diffuse\" has no roughness", {"objects.0.roughness_texture=half.png"});
 }
 
-/// Where a field is too weak to be seen, so is the edge of the light that comes through it. Groups are finite there.
+/// Where a field is too weak to be seen, so is the edge of the light that comes through it.
 TEST_F(FilmScene, TheLightsEdgeHasNoSeam) {
   write_quad("\"smooth_angle\": 0");
   const Settings wall{wall_, "camera.height=5", "lights.0.direction=[0.3,0.2,-1]", "integrator.max_samples=16",
@@ -145,6 +145,7 @@ TEST_F(FilmScene, TheLightsEdgeHasNoSeam) {
   const Image without = render(wall), with = render(weakened(wall));
   EXPECT_GT(mean(with, "caustic.G"), 0.01);
   expect_near(with, without, 2e-3f);
+  // Pictures of groups of lights have finite values at that edge, which `render` expects.
   render(weakened({wall_, "camera.height=5",
                    R"(lights=[{"kind":"directional","direction":[0.3,0.2,-1],"angle":0.53,"group":"sun"},
                               {"kind":"constant","strength":0.0005,"group":"sky"}])"}));

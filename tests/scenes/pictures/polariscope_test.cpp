@@ -23,8 +23,9 @@ class Polariscope : public Pictures {
  protected:
   void SetUp() override { write("scene.json", plate_scene); }
 
-  /// The coefficient with which the plate has a retardance, and its key.
+  /// The coefficient with which the plate has a retardance.
   double coefficient(double nanometres) { return nanometres * 1e-9 / (8e6 * channel(render({}), "length")[0]); }
+  /// The setting of it.
   std::string retarding(double nanometres) {
     return fmt::format("integrator.stress_optic={}", coefficient(nanometres));
   }

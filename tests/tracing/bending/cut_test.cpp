@@ -23,10 +23,7 @@ TriangleMesh mirrored_part(const Vector3d& low, const Vector3d& high) {
 /// Rings of latitude about a centre; a pole is a corner of many triangles.
 TriangleMesh ball_part(const Vector3d& center, double radius) {
   auto ball = std::get<TriangleMesh>(sphere(8).shape);
-  for (Vector3d& vertex : ball.vertices) {
-    if (std::abs(vertex.z()) == 1) vertex.head<2>().setZero();  // All corners at a pole are at one place.
-    vertex = center + radius * vertex;
-  }
+  for (Vector3d& vertex : ball.vertices) vertex = center + radius * vertex;
   return ball;
 }
 

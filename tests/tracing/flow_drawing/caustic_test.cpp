@@ -26,16 +26,16 @@ Caustic drawn(const FlowMap& map, const std::vector<CausticBand>& bands = {Caust
   return draw_caustic(map, unit_plate(), bands, settings, Progress());
 }
 
-/// Light that lands at x of the start (u, v), and turns at some u; of v, it fills 60 rows of pixels.
+/// Light of the start (u, v) lands at x(u, v) and in row 2 + 60 v.
 struct FoldingLight {
   const char* name;
   double (*x)(double u, double v);
-  std::vector<double> (*turns)(double v);  ///< And the last u, 1.
+  std::vector<double> (*turns)(double v);  ///< Each u where x turns, in order, and then 1.
 
   Vector2d operator()(const Vector2d& at) const { return {x(at.x(), at.y()), 2 + 60 * at.y()}; }
 };
 
-/// The irradiance in closed form. For each v, the light between two places is the length of the set of u that lands
+/// The exact irradiance. For each v, the light between two places is the length of the set of u that lands
 /// there, of which x is inverted by bisection between its turns.
 std::vector<double> exact_irradiance(const FoldingLight& light) {
   std::vector<double> exact(pixels * pixels);

@@ -249,6 +249,23 @@ TEST_P(PacketKernel, KnowsTheChangeOfRadiance) {
   }
 }
 
+/// Adding c(P) I to T changes no ray and no Λ.
+TEST_P(PacketKernel, IsotropicTensorsChangeNoRadiance) {
+  const TensorFunction smooth = smooth_tensor(41);
+  const auto changes = [&](double c) {
+    TensorField field = lattice_field(index_box({0, 0, 0}, {24, 24, 24}), lattices()[0], [&](const Vector3d& p) {
+      return Matrix3d(0.1 * (smooth(p) + c * p.x() * Matrix3d::Identity()));
+    });
+    RayBatch rays = random_rays(field, 16, {0.3, -1}, 42);
+    rays.wants_log_radiance_scale = true;
+    const Scene scene = make_scene("isotropic", std::move(field), {}, 0, std::move(rays));
+    return traced(scene, scene.rays).log_radiance_scale;
+  };
+  const std::vector<double> without = changes(0), with = changes(1);
+  for (std::size_t i = 0; i < with.size(); ++i) EXPECT_NEAR(with[i], without[i], 1e-3) << "ray " << i;
+  EXPECT_GT(*std::max_element(without.begin(), without.end()), 0.1);
+}
+
 TEST_P(PacketKernel, CarriesDifferentials) {
   for (const Lattice& lattice : tested_lattices()) {
     const Vector3d middle = odd_box().cast<double>().center();

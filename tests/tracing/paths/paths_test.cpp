@@ -226,7 +226,8 @@ TEST(Paths, StopsWhenCancelledAndRefusesNegativeTolerances) {
   wrong[0].tolerance = -1;
   wrong[1].tensor_tolerance = NAN;
   for (const PathSettings& settings : wrong)
-    EXPECT_THROW(trace_paths(field, geometry, {}, {}, settings, Progress()), std::invalid_argument);
+    EXPECT_THROW(trace_paths(field, geometry, {}, {}, settings, Progress()), std::invalid_argument)
+        << settings.tolerance << " " << settings.tensor_tolerance;
 }
 
 class PathThinning : public EveryInstructionSet {};

@@ -111,12 +111,14 @@ TEST_P(RaysThroughLevels, SurfacesAndCutsWithinFineBricks) {
 
 /// Alone, in a batch, and in any order: what becomes of a ray does not depend on the others, nor on threads.
 TEST_P(RaysThroughLevels, ARayDoesNotDependOnTheOthers) {
-  TensorField field = waves_field(lattices()[2]);
-  RayBatch rays = rays_of_all_kinds(field, {0.02, 0.05});
-  rays.wants_log_radiance_scale = true;
-  const Scene scene = make_scene("alone", std::move(field), {}, 0, rays);
-  const RayBatch together = traced(scene, rays);
-  for (std::size_t i = 0; i < rays.size(); i += 5) expect_identical(scene, together, {i});
+  for (const bool wants_radiance : {false, true}) {
+    TensorField field = waves_field(lattices()[2]);
+    RayBatch rays = rays_of_all_kinds(field, {0.02, 0.05});
+    rays.wants_log_radiance_scale = wants_radiance;
+    const Scene scene = make_scene("alone", std::move(field), {}, 0, rays);
+    const RayBatch together = traced(scene, rays);
+    for (std::size_t i = 0; i < rays.size(); i += 5) expect_identical(scene, together, {i});
+  }
 }
 
 TEST_P(RaysThroughLevels, DifferentialsAreThoseOfTheReference) {

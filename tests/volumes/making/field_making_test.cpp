@@ -32,7 +32,7 @@ Matrix3d damaged(const Vector3i& i) {
   return is_damaged ? Matrix3d(Matrix3d::Constant(NAN)) : symmetric(i);
 }
 
-/// Bit for bit.
+/// Equal in every number.
 void expect_same_bricks(const TensorField& a, const TensorField& b) {
   ASSERT_EQ(a.levels(), b.levels());
   for (std::size_t level = 0; level < a.bricks_of_levels().size(); ++level) {

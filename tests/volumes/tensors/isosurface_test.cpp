@@ -81,7 +81,8 @@ TEST(IsosurfaceTest, SphereOfSecondOrder) {
 }
 
 TEST(IsosurfaceTest, AnyAffineTransform) {
-  const Affine3d to_world(0.09 * sheared_transform().linear());  // Edges of voxels are shorter than 0.08.
+  Affine3d to_world(Eigen::Translation3d(0.1, 0, -0.1));
+  to_world.linear() = 0.1 * sheared_transform().linear();  // Edges of voxels are at most 0.08 long.
   Affine3d mirrored = to_world;
   mirrored.linear().col(1) *= -1;
   for (const Affine3d& transform : {to_world, mirrored}) {
